@@ -1,0 +1,154 @@
+"""The one place that knows how the installed DOLFINx spells things.
+
+Import DOLFINx, UFL, PETSc and MPI from here and nowhere else. Debian 12's DOLFINx 0.5.2 switches
+the process to ``RTLD_GLOBAL`` and leaves it there, after which VTK and PyPI's h5py break
+(design.md §4); the import below keeps the flags as they were. Debian 13's 0.9.0 is covered by
+the same functions.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_set_flags: Callable[[int], None] = sys.setdlopenflags
+_log_level, _log_handlers = logging.root.level, list(logging.root.handlers)
+try:
+    sys.setdlopenflags = lambda _flags: None  # type: ignore[assignment]
+    import basix
+    import dolfinx
+    import ufl
+    from dolfinx import fem, mesh
+    from dolfinx.fem import petsc as fem_petsc
+    from mpi4py import MPI
+    from petsc4py import PETSc
+finally:
+    sys.setdlopenflags = _set_flags  # type: ignore[assignment]
+
+__all__ = [
+    "MPI",
+    "PETSC_ERROR",
+    "PETSc",
+    "clear_stale_kernels",
+    "compile_form",
+    "create_mesh",
+    "fem",
+    "fem_petsc",
+    "install_abort_on_error",
+    "mixed_space",
+    "ufl",
+    "versions",
+]
+
+# FFCx configures the root logger of every program that imports it
+logging.root.setLevel(_log_level)
+logging.root.handlers[:] = _log_handlers
+
+PETSC_ERROR = PETSc.Error
+_HAS_BASIX_UFL = hasattr(basix, "ufl")
+_JIT = {"cffi_extra_compile_args": ["-O2", "-g0"], "timeout": 600}
+
+
+def kernel_cache() -> Path:
+    """Folder in which DOLFINx keeps its compiled kernels."""
+    root = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(root) / "fenics"
+
+
+def clear_stale_kernels(older_than_s: float = 600.0) -> int:
+    """Remove kernels whose compilation was killed; they would block every later run.
+
+    Returns
+    -------
+    int
+        Number of files removed.
+    """
+    removed = 0
+    for source in kernel_cache().glob("*.c"):
+        done = source.with_suffix(".c.cached")
+        try:
+            if not done.exists() and time.time() - source.stat().st_mtime > older_than_s:
+                source.unlink()
+                removed += 1
+        except OSError:
+            continue
+    return removed
+
+
+def compile_form(form: Any) -> Any:
+    """Compile a UFL form with this project's compiler flags (cached on disk by signature)."""
+    if _HAS_BASIX_UFL:
+        return fem.form(form, jit_options=_JIT)
+    return fem.form(form, jit_params=_JIT)
+
+
+def create_mesh(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Any:
+    """Serial DOLFINx mesh of ``points (n, 2)`` and ``triangles (m, 3)`` on this process."""
+    cells = np.ascontiguousarray(triangles, dtype=np.int64)
+    if _HAS_BASIX_UFL:
+        element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,))
+        return mesh.create_mesh(MPI.COMM_SELF, cells, points, ufl.Mesh(element))
+    cell = ufl.Cell("triangle", geometric_dimension=2)
+    return mesh.create_mesh(
+        MPI.COMM_SELF, cells, points, ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1))
+    )
+
+
+def vector_element(domain: Any, family: str, dimension: int = 3) -> Any:
+    """Lowest-order element with vector values (``family``: "Lagrange" or "CR")."""
+    if _HAS_BASIX_UFL:
+        return basix.ufl.element(family, "triangle", 1, shape=(dimension,))
+    return ufl.VectorElement(family, domain.ufl_cell(), 1, dim=dimension)
+
+
+def scalar_element(domain: Any, family: str) -> Any:
+    """Lowest-order scalar element."""
+    if _HAS_BASIX_UFL:
+        return basix.ufl.element(family, "triangle", 1)
+    return ufl.FiniteElement(family, domain.ufl_cell(), 1)
+
+
+def function_space(domain: Any, element: Any) -> Any:
+    """Function space of a UFL element."""
+    make = fem.functionspace if hasattr(fem, "functionspace") else fem.FunctionSpace
+    return make(domain, element)
+
+
+def mixed_space(domain: Any, elements: list[Any]) -> Any:
+    """Function space of a mixed element."""
+    if _HAS_BASIX_UFL:
+        return function_space(domain, basix.ufl.mixed_element(elements))
+    return function_space(domain, ufl.MixedElement(elements))
+
+
+def versions() -> dict[str, str]:
+    """Versions of the numerical stack, for the report."""
+    petsc = ".".join(str(part) for part in PETSc.Sys.getVersion())
+    return {
+        "python": sys.version.split()[0],
+        "dolfinx": dolfinx.__version__,
+        "petsc": petsc,
+        "numpy": np.__version__,
+    }
+
+
+def install_abort_on_error() -> None:
+    """Make an exception on one rank end all of them instead of leaving the others waiting."""
+    if MPI.COMM_WORLD.size == 1:
+        return
+    previous = sys.excepthook
+
+    def abort(kind: Any, value: Any, trace: Any) -> None:
+        previous(kind, value, trace)
+        sys.stderr.flush()
+        MPI.COMM_WORLD.Abort(1)
+
+    sys.excepthook = abort

@@ -1,0 +1,102 @@
+"""Elastic model plus constraint terms, reduced to the unknowns that are free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from avneo_fem.constraints.self_contact import SelfContact
+from avneo_fem.constraints.term import Term
+from avneo_fem.equilibrium.shell_model import ShellModel
+
+__all__ = ["CuspSystem"]
+
+Floats = NDArray[np.float64]
+
+
+class CuspSystem:
+    """Residual, tangent and merit of one cusp.
+
+    Parameters
+    ----------
+    model : ShellModel
+        Elastic energy, pressure and free-edge force.
+    contact : SelfContact or None
+        Barrier and step filter; None lets layers cross.
+    """
+
+    def __init__(self, model: ShellModel, contact: SelfContact | None) -> None:
+        self.model, self.contact = model, contact
+        self.terms: list[Term] = []
+        self.fixed = np.zeros(model.size, dtype=bool)
+        self._expand = self._expansion()
+
+    def _expansion(self) -> sp.csr_matrix:
+        """(size, 3n) matrix that puts nodal vectors at their place in the state."""
+        rows = self.model.position_dofs.ravel()
+        ones = np.ones(len(rows))
+        shape = (self.model.size, len(rows))
+        return sp.csr_matrix((ones, (rows, np.arange(len(rows)))), shape=shape)
+
+    def positions(self, state: Floats) -> Floats:
+        """(n, 3) node positions of a state."""
+        return state[self.model.position_dofs]
+
+    def fix(self, dofs: NDArray[np.int64]) -> None:
+        """Hold these entries of the state at their present values."""
+        self.fixed[dofs.ravel()] = True
+
+    @property
+    def free(self) -> NDArray[np.int64]:
+        """Indices of the free unknowns."""
+        return np.flatnonzero(~self.fixed)
+
+    def _active(self, extra: Sequence[Term]) -> list[Term]:
+        contact = [] if self.contact is None else [self.contact]
+        return [*contact, *self.terms, *extra]
+
+    def residual(self, state: Floats, extra: Sequence[Term] = ()) -> Floats:
+        """Out-of-balance force of every unknown, (size,); held ones carry their reaction."""
+        result = self.model.residual(state)
+        points = self.positions(state)
+        for term in self._active(extra):
+            result[self.model.position_dofs] += term.gradient(points)
+        return result
+
+    def relative_residual(self, state: Floats) -> float:
+        """Norm of the undamped residual over the pressure load P x area."""
+        return float(np.linalg.norm(self.residual(state)[self.free]) / self.model.load_scale())
+
+    def tangent(self, state: Floats, extra: Sequence[Term] = ()) -> sp.csr_matrix:
+        """Derivative of :meth:`residual`, (size, size)."""
+        points = self.positions(state)
+        total: sp.spmatrix | None = None
+        for term in self._active(extra):
+            hessian = term.hessian(points)
+            total = hessian if total is None else total + hessian
+        stiffness = self.model.tangent(state)
+        if total is None:
+            return stiffness
+        return (stiffness + self._expand @ total.tocsr() @ self._expand.T).tocsr()
+
+    def merit_change(
+        self,
+        state: Floats,
+        base: Floats,
+        base_energy: float,
+        extra: Sequence[Term] = (),
+    ) -> float:
+        """Energy of ``state`` minus that of ``base`` minus the work of the pressure between them.
+
+        Along a straight step this is a true potential of the residual, follower pressure
+        included, so a line search on it is sound.
+        """
+        return self.energy(state, extra) - base_energy - self.model.pressure_work(state, base)
+
+    def energy(self, state: Floats, extra: Sequence[Term] = ()) -> float:
+        """Energy of all conservative parts [mN mm]."""
+        points = self.positions(state)
+        return self.model.energy(state) + sum(t.energy(points) for t in self._active(extra))

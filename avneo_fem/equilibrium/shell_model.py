@@ -1,0 +1,286 @@
+"""One cusp as a finite-element shell: few compiled kernels, plain arrays outside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from avneo_fem import compat
+from avneo_fem.compat import PETSc, fem, fem_petsc, ufl
+from avneo_fem.mechanics.bending import bending_energy_density
+from avneo_fem.mechanics.loads import (
+    free_edge_energy_density,
+    pressure_force_density,
+    pressure_work_density,
+)
+from avneo_fem.mechanics.materials import material_named
+from avneo_fem.mechanics.membrane import membrane_energy_density
+from avneo_fem.meshing.cusp_mesh import CuspMesh
+
+__all__ = ["ShellModel", "ShellParameters"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_FREE_EDGE = 1
+
+
+@dataclass(frozen=True)
+class ShellParameters:
+    """What the kernels take as constants; changing any of them compiles nothing.
+
+    Attributes
+    ----------
+    material : str
+        ``neo_hookean`` or ``st_venant_kirchhoff``.
+    bending : bool
+        Kirchhoff-Love bending on or off (c^b of (1.7)); off allocates no edge angles.
+    young_modulus, thickness, pressure : float
+        E [kPa], H [mm], P [kPa].
+    free_edge_stiffness, free_edge_width, free_edge_clearance : float
+        eta_1 [kPa], eta_2 [mm], d_0 = -eta_3 [mm] of (1.6).
+    plane_point, plane_normal : (3,) arrays
+        A_0 and n of the plane of commissures.
+    template_level : float
+        N_0 . e_2, height of the corners in template coordinates [mm].
+    """
+
+    material: str = "neo_hookean"
+    bending: bool = True
+    young_modulus: float = 1000.0
+    thickness: float = 0.5
+    pressure: float = 8.0
+    free_edge_stiffness: float = 80.0
+    free_edge_width: float = 0.1
+    free_edge_clearance: float = 0.0
+    plane_point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    plane_normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    template_level: float = 0.0
+
+
+class ShellModel:
+    """Energy, residual and tangent of a cusp under pressure and free-edge force.
+
+    The state is one vector ``u`` with the current node positions (``position_dofs``, (n, 3)) and,
+    with bending, one director angle per edge (``angle_dofs``, (e,)), cf. ``mechanics.bending``.
+
+    Parameters
+    ----------
+    mesh : CuspMesh
+        Flat template, which is the stress-free state.
+    parameters : ShellParameters
+        Constants of the model.
+    """
+
+    def __init__(self, mesh: CuspMesh, parameters: ShellParameters) -> None:
+        self.mesh, self.parameters = mesh, parameters
+        self.domain = compat.create_mesh(mesh.points, mesh.triangles)
+        position_element = compat.vector_element(self.domain, "Lagrange")
+        if parameters.bending:
+            angle_element = compat.scalar_element(self.domain, "CR")
+            self.space = compat.mixed_space(self.domain, [position_element, angle_element])
+            position_space, position_map = self.space.sub(0).collapse()
+            angle_space, angle_map = self.space.sub(1).collapse()
+            midpoints = mesh.points[mesh.edges].mean(axis=1)
+            rows = _match(angle_space.tabulate_dof_coordinates(), midpoints)
+            self.angle_dofs = np.asarray(angle_map, dtype=np.int64)[rows]
+            self._director, rows = self._edge_function(midpoints, 3)
+            self._director_rows = rows
+            self._direction, rows = self._edge_function(midpoints, 2)
+            along = np.diff(mesh.points[mesh.edges], axis=1)[:, 0]
+            along /= np.linalg.norm(along, axis=1, keepdims=True)
+            self._direction.x.array.reshape(-1, 2)[rows] = along
+        else:
+            self.space = compat.function_space(self.domain, position_element)
+            position_space, position_map = self.space, np.arange(3 * len(mesh.points))
+            self.angle_dofs = np.empty(0, dtype=np.int64)
+        nodes = _match(position_space.tabulate_dof_coordinates(), mesh.points)
+        blocks = 3 * nodes[:, None] + np.arange(3)
+        self.position_dofs: Ints = np.asarray(position_map, dtype=np.int64)[blocks]
+        self._compile()
+
+    def _compile(self) -> None:
+        p, domain = self.parameters, self.domain
+        self._state, self._base = fem.Function(self.space), fem.Function(self.space)
+        names = ("young_modulus", "thickness", "pressure", "free_edge_width")
+        self._constants = {name: self._constant(getattr(p, name)) for name in names}
+        c = self._constants
+        c["free_edge_load"] = self._constant(0.0)
+        c["free_edge_clearance"] = self._constant(p.free_edge_clearance)
+        c["template_level"] = self._constant(p.template_level)
+        c["plane_point"] = self._constant(p.plane_point)
+        c["plane_normal"] = self._constant(p.plane_normal)
+        position, angle = self._split(self._state)
+        start, _ = self._split(self._base)
+        gradient = ufl.grad(position)
+        dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 1})
+        dx2 = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 2})
+        ds = ufl.Measure(
+            "ds",
+            domain=domain,
+            subdomain_data=self._free_edge_tags(),
+            metadata={"quadrature_degree": 2},
+        )(_FREE_EDGE)
+        material = material_named(p.material, c["young_modulus"])
+        energy = membrane_energy_density(gradient, material, c["thickness"]) * dx
+        if p.bending:
+            rigidity = c["young_modulus"] * c["thickness"] ** 3 / 12
+            energy += (
+                bending_energy_density(
+                    domain, position, angle, self._director, self._direction, rigidity
+                )
+                * dx
+            )
+        height = ufl.dot(position - c["plane_point"], c["plane_normal"]) - (
+            ufl.SpatialCoordinate(domain)[1] - c["template_level"]
+        )
+        energy += (
+            free_edge_energy_density(
+                height, c["free_edge_load"], c["free_edge_width"], c["free_edge_clearance"]
+            )
+            * ds
+        )
+        test, trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
+        residual = ufl.derivative(energy, self._state, test)
+        virtual = test if not p.bending else ufl.split(test)[0]
+        residual -= ufl.dot(pressure_force_density(gradient, c["pressure"]), virtual) * dx2
+        work = pressure_work_density(position, start, c["pressure"]) * dx2
+        self._energy_form = compat.compile_form(energy)
+        self._work_form = compat.compile_form(work)
+        self._residual_form = compat.compile_form(residual)
+        self._tangent_form = compat.compile_form(ufl.derivative(residual, self._state, trial))
+        self._vector = fem_petsc.create_vector(self._residual_form)
+        self._matrix = fem_petsc.create_matrix(self._tangent_form)
+        self.free_edge_stiffness = p.free_edge_stiffness
+
+    def _edge_function(self, midpoints: Floats, dimension: int) -> tuple[Any, Ints]:
+        """Crouzeix-Raviart vector function and the row of its array for each edge."""
+        element = compat.vector_element(self.domain, "CR", dimension)
+        space = compat.function_space(self.domain, element)
+        return fem.Function(space), _match(space.tabulate_dof_coordinates(), midpoints)
+
+    def _constant(self, value: Any) -> Any:
+        return fem.Constant(self.domain, np.asarray(value, dtype=PETSc.ScalarType))
+
+    def _split(self, function: Any) -> tuple[Any, Any]:
+        return ufl.split(function) if self.parameters.bending else (function, None)
+
+    def _free_edge_tags(self) -> Any:
+        from dolfinx.mesh import locate_entities_boundary, meshtags
+
+        topology = self.domain.topology
+        topology.create_connectivity(1, 2)
+        topology.create_connectivity(1, 0)
+        on_boundary = locate_entities_boundary(
+            self.domain, 1, lambda x: np.full(x.shape[1], True)
+        )
+        rows = _match(self.domain.geometry.x, self.mesh.points)
+        free = np.zeros(len(rows), dtype=bool)
+        free[rows[self.mesh.free_edge]] = True
+        x = self.domain.geometry.x
+        vertices = np.array([topology.connectivity(1, 0).links(f) for f in on_boundary])
+        to_geometry = self._vertex_to_geometry()
+        ends = to_geometry[vertices]
+        both = free[ends].all(axis=1)
+        # a suture edge can have both ends on the free edge only at a corner of one triangle
+        pairs = {
+            tuple(sorted((a, b)))
+            for a, b in zip(
+                rows[self.mesh.free_edge][:-1], rows[self.mesh.free_edge][1:], strict=True
+            )
+        }
+        exact = np.array([tuple(sorted(map(int, pair))) in pairs for pair in ends])
+        facets = np.sort(on_boundary[both & exact]).astype(np.int32)
+        assert len(facets) == len(self.mesh.free_edge) - 1, (len(facets), x.shape)
+        return meshtags(self.domain, 1, facets, np.full(len(facets), _FREE_EDGE, dtype=np.int32))
+
+    def _vertex_to_geometry(self) -> Ints:
+        topology = self.domain.topology
+        topology.create_connectivity(2, 0)
+        cells = topology.connectivity(2, 0)
+        dofmap = self.domain.geometry.dofmap
+        count = topology.index_map(2).size_local
+        geometry = np.asarray(getattr(dofmap, "array", dofmap)).reshape(count, -1)
+        table = np.zeros(topology.index_map(0).size_local, dtype=np.int64)
+        vertices = np.array([cells.links(c) for c in range(count)])
+        table[vertices] = geometry
+        return table
+
+    # -- constants -------------------------------------------------------------------------
+    @property
+    def pressure(self) -> float:
+        """P [kPa]; may be set between solves."""
+        return float(self._constants["pressure"].value)
+
+    @pressure.setter
+    def pressure(self, value: float) -> None:
+        self._constants["pressure"].value = value
+
+    @property
+    def free_edge_stiffness(self) -> float:
+        """eta_1 of (1.6) [kPa]; may be set between solves."""
+        return self._free_edge_stiffness
+
+    @free_edge_stiffness.setter
+    def free_edge_stiffness(self, value: float) -> None:
+        self._free_edge_stiffness = value
+        along = np.diff(self.mesh.points[self.mesh.free_edge], axis=0)
+        length = np.linalg.norm(along, axis=1).sum()
+        self._constants["free_edge_load"].value = value * self.mesh.area / length
+
+    def set_directors(self, directors: Floats) -> None:
+        """Reference directors p_e, (e, 3) unit vectors in the order of ``mesh.edges``."""
+        self.directors = directors
+        self._director.x.array.reshape(-1, 3)[self._director_rows] = directors
+
+    # -- assembly --------------------------------------------------------------------------
+    @property
+    def size(self) -> int:
+        """Number of unknowns, constrained ones included."""
+        return len(self._state.x.array)
+
+    def load_scale(self) -> float:
+        """P x area of the template [mN]; residuals are given relative to it."""
+        return self.parameters.pressure * self.mesh.area
+
+    def energy(self, state: Floats) -> float:
+        """Membrane, bending and free-edge energy [mN mm]."""
+        self._state.x.array[:] = state
+        return float(fem.assemble_scalar(self._energy_form))
+
+    def pressure_work(self, state: Floats, base: Floats) -> float:
+        """Work of the pressure on the straight way from ``base`` to ``state`` [mN mm]."""
+        self._state.x.array[:] = state
+        self._base.x.array[:] = base
+        return float(fem.assemble_scalar(self._work_form))
+
+    def residual(self, state: Floats) -> Floats:
+        """Gradient of the energy minus the pressure force, (size,) [mN; mN mm for angles]."""
+        self._state.x.array[:] = state
+        with self._vector.localForm() as local:
+            local.set(0.0)
+        fem_petsc.assemble_vector(self._vector, self._residual_form)
+        return self._vector.array.copy()
+
+    def tangent(self, state: Floats) -> sp.csr_matrix:
+        """Derivative of :meth:`residual`, (size, size)."""
+        self._state.x.array[:] = state
+        self._matrix.zeroEntries()
+        fem_petsc.assemble_matrix(self._matrix, self._tangent_form)
+        self._matrix.assemble()
+        rows, columns, values = self._matrix.getValuesCSR()
+        return sp.csr_matrix((values, columns, rows), shape=(self.size, self.size))
+
+
+def _match(coordinates: Floats, points: Floats) -> Ints:
+    """Row of ``coordinates`` (k, 3) at each of ``points`` (n, 2)."""
+    from scipy.spatial import cKDTree
+
+    distance, rows = cKDTree(coordinates[:, :2]).query(points)
+    if distance.max() > 1e-8 or len(np.unique(rows)) != len(points):
+        raise RuntimeError("finite-element nodes do not match the mesh they were made from")
+    return rows.astype(np.int64)

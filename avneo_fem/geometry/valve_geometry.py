@@ -1,0 +1,210 @@
+"""Geometry of a whole valve: three cusps, their suture lines and the verdict on their sizes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from avneo_fem.errors import SceneError
+from avneo_fem.geometry.commissure import (
+    CommissurePlane,
+    TripleContactPoint,
+    commissure_angles,
+    commissure_directions,
+    contact_lengths,
+    triple_contact_point,
+)
+from avneo_fem.geometry.root import CylinderRoot
+from avneo_fem.geometry.stitching import StitchingMap
+from avneo_fem.geometry.suture_line import AorticSutureLine
+from avneo_fem.geometry.template import CuspTemplate, free_edge_length_for
+from avneo_fem.scene import Competence, Scene
+
+__all__ = ["CuspGeometry", "ValveGeometry", "competence_verdict"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CuspGeometry:
+    """One cusp: template, the line on the wall, and how the one is stitched to the other.
+
+    ``thickness`` is H [mm]. In the methods ``s_csl`` (n,) are arc lengths on the template's
+    suture line, in [0, l_c] [mm] from corner N_0.
+    """
+
+    index: int
+    template: CuspTemplate
+    suture_line: AorticSutureLine
+    stitching: StitchingMap
+    thickness: float
+
+    def sutured_position(self, s_csl: ArrayLike) -> Array:
+        """r_asl(gamma(s)), points (n, 3) [mm] (paper §3.2, step 2)."""
+        return self.suture_line.point(self.stitching.annulus_arc_length(s_csl))
+
+    def sutured_tangent(self, s_csl: ArrayLike) -> Array:
+        """tau_asl(gamma(s)), unit vectors (n, 3) (paper §3.1)."""
+        return self.suture_line.tangent(self.stitching.annulus_arc_length(s_csl))
+
+    def sutured_conormal(self, s_csl: ArrayLike) -> Array:
+        """b_asl(gamma(s)), unit vectors (n, 3) (paper §3.1, §3.2 step 4)."""
+        return self.suture_line.conormal(self.stitching.annulus_arc_length(s_csl))
+
+
+@dataclass(frozen=True, eq=False)
+class ValveGeometry:
+    """What the paper's section 3 calls the input geometry, checked.
+
+    Attributes
+    ----------
+    root : CylinderRoot
+    commissures : CommissurePlane
+        A_i, midpoint of the chord between the end of the ASL of cusp i+1 and the start of that of
+        cusp i+2 [mm].
+    cusps : tuple of CuspGeometry
+    commissure_lengths, contact_lengths : (3,) float64
+        l_i and c_i [mm] (paper section 3.3).
+    triple_contact : TripleContactPoint
+    competent : bool
+    competence_reason : str
+        Why, or why not and what would help (paper section 3.4, step 1).
+    """
+
+    root: CylinderRoot
+    commissures: CommissurePlane
+    cusps: tuple[CuspGeometry, CuspGeometry, CuspGeometry]
+    commissure_lengths: Array
+    contact_lengths: Array
+    triple_contact: TripleContactPoint
+    competent: bool
+    competence_reason: str
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> ValveGeometry:
+        """Build the geometry of a scene.
+
+        Raises
+        ------
+        SceneError
+            For the first of: a template that does not exist, chords that form no triangle, a gap
+            that leaves no suture line, a stitching ratio out of range, inconsistent lengths, and,
+            with ``competence.policy = "error"``, a valve that is not competent.
+        """
+        common = all(cusp.template == scene.cusp[0].template for cusp in scene.cusp)
+        keys = ["template" if common else f"cusp.{i}.template" for i in range(3)]
+        templates = [
+            CuspTemplate(cusp.template, key) for cusp, key in zip(scene.cusp, keys, strict=True)
+        ]
+        lines = _suture_lines(scene)
+        cusps = [
+            CuspGeometry(
+                i,
+                templates[i],
+                lines[i],
+                _stitching(i, templates[i], lines[i], scene.stitching.gather_ratio, keys[i]),
+                templates[i].thickness,
+            )
+            for i in range(3)
+        ]
+        plane = CommissurePlane(
+            np.array([(lines[(i + 1) % 3].ends[1] + lines[(i + 2) % 3].ends[0]) for i in range(3)])
+            / 2.0
+        )
+        lengths = np.array([template.intercommissural_length for template in templates])
+        contact = contact_lengths(lengths)
+        triple = triple_contact_point(plane.points, contact)
+        competent, reason = competence_verdict(triple, plane, contact, scene.competence)
+        if not competent and scene.competence.policy == "error":
+            raise SceneError(
+                "competence.policy", "error", f'{reason}; "warn" would go on all the same'
+            )
+        for array in (lengths, contact, triple.point):
+            array.flags.writeable = False
+        root = CylinderRoot(scene.root.radius)
+        return cls(
+            root, plane, (cusps[0], cusps[1], cusps[2]), lengths, contact, triple, competent, reason
+        )
+
+
+def _suture_lines(scene: Scene) -> list[AorticSutureLine]:
+    """Suture lines of the three cusps; w_i = (2 alpha_i - gap/R) R (design.md section 1)."""
+    radius, gap = scene.root.radius, scene.commissures.gap
+    alpha = commissure_angles(scene.commissures.chord_ratio)
+    if gap >= 2.0 * radius * alpha.min():
+        raise SceneError(
+            "commissures.gap",
+            gap,
+            f"leaves no room for the suture line of cusp {int(alpha.argmin())}:"
+            f" must be below its arc of {2.0 * radius * alpha.min():.6g} mm",
+        )
+    start = np.roll(commissure_directions(alpha), -1) + gap / (2.0 * radius)
+    common = all(cusp.suture_line == scene.cusp[0].suture_line for cusp in scene.cusp)
+    return [
+        AorticSutureLine(
+            radius,
+            float(start[i]),
+            float(2.0 * alpha[i] * radius - gap),
+            scene.cusp[i].suture_line,
+            "suture_line" if common else f"cusp.{i}.suture_line",
+        )
+        for i in range(3)
+    ]
+
+
+def _stitching(
+    index: int, template: CuspTemplate, line: AorticSutureLine, gather: float, key: str
+) -> StitchingMap:
+    """Stitching map of one cusp; its error says which free edge length would do."""
+    try:
+        return StitchingMap(template.suture_length, line.length, gather, key)
+    except SceneError as error:
+        high = free_edge_length_for(gather * line.length, template.parameters)
+        if high is None:
+            valid = (
+                "; no free_edge_length would do: pi belly_radius + 2 corner_height must be below"
+                f" {gather * line.length:.6g} mm"
+            )
+        else:
+            low = free_edge_length_for(line.length, template.parameters)
+            low = 2.0 * template.parameters.belly_radius if low is None else low
+            valid = f"; between {low:.6g} and {high:.6g} mm would do, all else kept"
+        raise SceneError(
+            f"{key}.free_edge_length",
+            template.parameters.free_edge_length,
+            f"cusp {index} does not fit its suture line: {error.valid}{valid}",
+        ) from None
+
+
+def competence_verdict(
+    triple: TripleContactPoint, plane: CommissurePlane, contact: Array, limits: Competence
+) -> tuple[bool, str]:
+    """Verdict of paper section 3.4, step 1, and the reason in one sentence.
+
+    Scaling all free edge lengths by a factor f divides nu* by f. In case 1 the point leaves the
+    side A_j A_k when c_i comes down to |A_i K_i| / nu_i, that is when l_j and l_k both lose the
+    difference.
+    """
+    nu = triple.nu_star
+    reasons = []
+    if triple.edge_index is not None:
+        i = triple.edge_index
+        j, k = sorted({0, 1, 2} - {i})
+        excess = contact[i] - np.linalg.norm(plane.points[i] - triple.point) / nu
+        reasons.append(
+            f"(3.2) has no solution, the triple contact point lies on the side"
+            f" A_{j}A_{k}: cusp {i} is too small for cusps {j} and {k}, whose"
+            f" free_edge_length would have to be shorter by {excess:.4g} mm each"
+        )
+    if nu > limits.maximum_nu:
+        reasons.append(f"nu* = {nu:.4g} > {limits.maximum_nu:g}: the cusps are too small to close")
+    if nu < limits.minimum_nu:
+        reasons.append(f"nu* = {nu:.4g} < {limits.minimum_nu:g}: the cusps are too large")
+    if not reasons:
+        return True, (
+            f"the triple contact point lies inside the triangle of the commissures and nu* ="
+            f" {nu:.4g} within [{limits.minimum_nu:g}, {limits.maximum_nu:g}]"
+        )
+    return False, f"{'; '.join(reasons)}; all free_edge_length times {nu:.4g} give nu* = 1"

@@ -1,0 +1,1 @@
+"""Membrane, Kirchhoff-Love bending and loads in UFL. Pure: no meshes, no solvers."""

@@ -1,0 +1,56 @@
+"""Hyperelastic membranes with Poisson ratio 0: a material is one method, its strain energy.
+
+Further models (a Fung-type pericardium, say) are one dataclass more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from avneo_fem.compat import ufl
+
+__all__ = ["Material", "NeoHookean", "StVenantKirchhoff", "material_named"]
+
+
+class Material(Protocol):
+    """What the membrane energy asks of a material."""
+
+    def strain_energy(self, right_cauchy_green: Any) -> Any:
+        """Strain energy per reference volume [kPa] of the in-plane C (2x2)."""
+
+
+@dataclass(frozen=True)
+class StVenantKirchhoff:
+    """psi = E/8 ((I1 - 1)^2 - 2 J^2 + 1), the paper's (1.3); equals E/2 tr(E^2) for nu = 0.
+
+    Not convex in compression: the nominal stress peaks at a stretch of 1/sqrt(3).
+    """
+
+    young_modulus: Any
+
+    def strain_energy(self, right_cauchy_green: Any) -> Any:
+        """psi(C) [kPa]."""
+        first = ufl.tr(right_cauchy_green)
+        return self.young_modulus / 8 * ((first - 1) ** 2 - 2 * ufl.det(right_cauchy_green) + 1)
+
+
+@dataclass(frozen=True)
+class NeoHookean:
+    """psi = E/4 (I1 - 2 - 2 ln J): same small-strain response (nu = 0), stiffens in compression.
+
+    The energy grows without bound as J -> 0, so a triangle cannot collapse.
+    """
+
+    young_modulus: Any
+
+    def strain_energy(self, right_cauchy_green: Any) -> Any:
+        """psi(C) [kPa]."""
+        first = ufl.tr(right_cauchy_green)
+        return self.young_modulus / 4 * (first - 2 - ufl.ln(ufl.det(right_cauchy_green)))
+
+
+def material_named(model: str, young_modulus: Any) -> Material:
+    """Material for the scene entry ``material.model``."""
+    models = {"neo_hookean": NeoHookean, "st_venant_kirchhoff": StVenantKirchhoff}
+    return models[model](young_modulus)

@@ -1,0 +1,15 @@
+"""Membrane energy: in-plane deformation of the cusp."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from avneo_fem.mechanics.kinematics import right_cauchy_green
+from avneo_fem.mechanics.materials import Material
+
+__all__ = ["membrane_energy_density"]
+
+
+def membrane_energy_density(gradient: Any, material: Material, thickness: Any) -> Any:
+    """H psi(C) [mN/mm]: energy per reference area whose variation is delta U_m of (1.2)."""
+    return thickness * material.strain_energy(right_cauchy_green(gradient))

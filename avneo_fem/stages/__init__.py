@@ -1,0 +1,1 @@
+"""The continuation that brings one flat template into the root, stage by stage."""

@@ -1,0 +1,276 @@
+"""The whole geometry against the check values of design.md section 1, and its errors."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from avneo_fem.errors import SceneError
+from avneo_fem.geometry.commissure import quasi_optimal_lengths
+from avneo_fem.geometry.valve_geometry import ValveGeometry
+from avneo_fem.scene import load_scene, parse_scene
+
+DEMOS = Path(__file__).parents[1] / "demos"
+
+GAMMA = (1.5, 1.0, 1.25)
+SCENES: dict[int, dict[str, Any]] = {
+    1: {},
+    2: {
+        "commissures": {"chord_ratio": [8.0, 9.0, 6.0]},
+        "suture_line": {"type": "B"},
+        "cusp": [
+            {"template": {"free_edge_length": 39.0 * g, "belly_radius": 16.5 * g}} for g in GAMMA
+        ],
+    },
+}
+TABLE: dict[int, tuple[list[float], list[float], float]] = {
+    1: ([0.5315] * 3, [19.5] * 3, 0.6153),
+    2: ([0.3963, 0.6203, 0.3824], [14.625, 34.125, 24.375], 0.6031),
+    3: ([0.8062, 0.7152, 0.7206], [6.872, 16.036, 11.454], 0.9859),
+}
+
+
+def build(data: dict[str, Any]) -> ValveGeometry:
+    """Geometry of a scene given as nested dictionaries."""
+    return ValveGeometry.from_scene(parse_scene(data))
+
+
+def quasi_optimal(scale: float = 1.0) -> dict[str, Any]:
+    """Experiment 3, or the same with all L_f scaled."""
+    ratio = {"chord_ratio": [6.0, 4.0, 5.0]}
+    sizes = [{"template": {"free_edge_length": x, "belly_radius": 9.0}} for x in (27.0, 20.0, 23.0)]
+    lengths = scale * quasi_optimal_lengths(
+        build({"commissures": ratio, "cusp": sizes}).commissures.chord_lengths
+    )
+    cusps = [
+        {"template": {"free_edge_length": float(x), "belly_radius": float(11.0 * x / 26.0)}}
+        for x in lengths
+    ]
+    return {"commissures": ratio, "cusp": cusps}
+
+
+def experiment(number: int, source: str) -> ValveGeometry:
+    """One of the paper's runs, from code or from its demo."""
+    if source == "demo":
+        return ValveGeometry.from_scene(load_scene(DEMOS / f"experiment_{number}.toml"))
+    return build(SCENES[number] if number in SCENES else quasi_optimal())
+
+
+@pytest.mark.parametrize("source", ["code", "demo"])
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_check_values(number: int, source: str) -> None:
+    """Truth: the independently computed table of design.md section 1, to all its digits."""
+    valve = experiment(number, source)
+    ratios, contact, nu = TABLE[number]
+    found = [cusp.stitching.stitching_ratio for cusp in valve.cusps]
+    assert found == pytest.approx(ratios, abs=0.5e-4)
+    assert valve.contact_lengths == pytest.approx(contact, abs=0.5e-3)
+    assert valve.triple_contact.nu_star == pytest.approx(nu, abs=0.5e-4)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_demo_equals_code(number: int) -> None:
+    """Truth: the demo files describe the scenes that design.md section 1 derives."""
+    demo, code = experiment(number, "demo"), experiment(number, "code")
+    assert demo.commissures.points == pytest.approx(code.commissures.points, abs=1e-12)
+    assert demo.commissure_lengths == pytest.approx(code.commissure_lengths, abs=1e-8)
+    for one, two in zip(demo.cusps, code.cusps, strict=True):
+        assert one.template.suture_length == pytest.approx(two.template.suture_length, abs=1e-7)
+        assert one.suture_line.length == pytest.approx(two.suture_line.length, abs=1e-12)
+    assert load_scene(DEMOS / f"experiment_{number}.toml").name == f"experiment-{number}"
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_commissures_lie_between_the_ends(number: int) -> None:
+    """Truth: A_i is half way from P_1 of cusp i+1 to P_0 of cusp i+2, at R cos(gap/2R), z = 0.
+
+    The ends are 0.5 mm apart along the wall, A_0 lies on +x, and the chords keep their ratio.
+    """
+    valve = experiment(number, "code")
+    ends = [cusp.suture_line.ends for cusp in valve.cusps]
+    points = valve.commissures.points
+    for i in range(3):
+        before, after = ends[(i + 1) % 3][1], ends[(i + 2) % 3][0]
+        assert points[i] == pytest.approx((before + after) / 2.0, abs=1e-13)
+        assert np.linalg.norm(after - before) == pytest.approx(24.0 * np.sin(0.25 / 12.0))
+    assert np.linalg.norm(points, axis=1) == pytest.approx([12.0 * np.cos(0.25 / 12.0)] * 3)
+    assert points[0, 0] > 0.0
+    assert np.abs(points[:, 2]).max() < 1e-12
+    assert abs(points[0, 1]) < 1e-12
+    ratio = np.array({1: [1.0, 1, 1], 2: [8.0, 9, 6], 3: [6.0, 4, 5]}[number])
+    assert valve.commissures.chord_lengths / ratio == pytest.approx(
+        [valve.commissures.chord_lengths[0] / ratio[0]] * 3, rel=1e-12
+    )
+    assert valve.commissures.normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
+
+
+def test_sutured_edge() -> None:
+    """Truth: corner to P_0, corner to P_1, middle to the bottom, b = +z there, on the wall."""
+    valve = experiment(1, "code")
+    for cusp in valve.cusps:
+        s = np.array([0.0, 0.5, 1.0]) * cusp.template.suture_length
+        position = cusp.sutured_position(s)
+        assert position[[0, 2]] == pytest.approx(cusp.suture_line.ends, abs=1e-12)
+        assert position[1, 2] == pytest.approx(-12.5, abs=1e-9)
+        assert cusp.sutured_conormal(s)[1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-7)
+        fine = np.linspace(0.0, cusp.template.suture_length, 101)
+        assert np.abs(valve.root.signed_distance(cusp.sutured_position(fine))).max() < 1e-12
+        h = 1e-6
+        slope = (cusp.sutured_position(fine[1:-1] + h) - cusp.sutured_position(fine[1:-1] - h)) / h
+        slope /= np.linalg.norm(slope, axis=1, keepdims=True)
+        assert np.abs(slope - cusp.sutured_tangent(fine[1:-1])).max() < 1e-4
+        assert cusp.thickness == 0.5
+
+
+def test_equal_cusps_are_rotations() -> None:
+    """Truth: in Experiment 1 cusp i is cusp 0 turned by i thirds about z, and C is the axis."""
+    valve = experiment(1, "code")
+    s = np.linspace(0.0, valve.cusps[0].template.suture_length, 50)
+    for cusp in valve.cusps:
+        angle = 2.0 * np.pi * cusp.index / 3.0
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        expected = valve.cusps[0].sutured_position(s)
+        expected[:, :2] = expected[:, :2] @ turn.T
+        assert np.abs(cusp.sutured_position(s) - expected).max() < 1e-12
+    assert np.abs(valve.triple_contact.point).max() < 1e-12
+
+
+def test_competent_and_not() -> None:
+    """Truth: Experiments 1 and 3 are competent, 2 falls in case 1 on A_0A_2 (design.md)."""
+    assert experiment(1, "code").competent
+    assert experiment(3, "code").competent
+    valve = experiment(2, "code")
+    assert not valve.competent
+    assert (valve.triple_contact.case, valve.triple_contact.edge_index) == ("edge", 1)
+    assert "A_0A_2" in valve.competence_reason
+    assert "0.6031" in valve.competence_reason
+
+
+def test_advice_for_case_1_works() -> None:
+    """Truth: shortening cusps 0 and 2 of Experiment 2 as advised makes (3.2) solvable, not less."""
+    reason = experiment(2, "code").competence_reason
+    excess = float(reason.split("shorter by ")[1].split(" mm")[0])
+    for factor, case in ((1.001, "interior"), (0.999, "edge")):
+        lengths = np.array([58.5, 39.0, 48.75]) - factor * excess * np.array([1.0, 0.0, 1.0])
+        cusps = [
+            {"template": {"free_edge_length": float(x), "belly_radius": 16.0}} for x in lengths
+        ]
+        assert build({**SCENES[2], "cusp": cusps}).triple_contact.case == case
+
+
+@pytest.mark.parametrize(("scale", "words"), [(0.9, "too small to close"), (2.2, "too large")])
+def test_advice_for_dilation_works(scale: float, words: str) -> None:
+    """Truth: nu* out of its limits is reported; all L_f times the given factor give nu* = 1."""
+    data = quasi_optimal(scale)
+    if scale < 1.0:  # small cusps: a smaller root so that the stitching ratio stays in range
+        for cusp in data["cusp"]:
+            cusp["template"]["corner_height"] = 16.0
+    data["stitching"] = {"gather_ratio": 6.0}
+    valve = build(data)
+    assert not valve.competent
+    assert words in valve.competence_reason
+    factor = float(valve.competence_reason.split("times ")[1].split(" ")[0])
+    for cusp in data["cusp"]:
+        cusp["template"]["free_edge_length"] *= factor
+        cusp["template"]["belly_radius"] *= factor  # so that the template still exists
+    assert build(data).triple_contact.nu_star == pytest.approx(1.0, abs=1e-3)
+    wide = {"minimum_nu": 0.01, "maximum_nu": 100.0}
+    assert build({**data, "competence": wide}).competent
+
+
+def test_policy_error() -> None:
+    """Truth: with policy "error" a valve that is not competent is refused with the reason."""
+    with pytest.raises(SceneError, match="A_0A_2") as caught:
+        build({**SCENES[2], "competence": {"policy": "error"}})
+    assert caught.value.key == "competence.policy"
+    assert build({"competence": {"policy": "error"}}).competent
+
+
+@pytest.mark.parametrize(
+    ("data", "key"),
+    [
+        ({"template": {"belly_radius": 33.0}}, "template.belly_radius"),
+        ({"cusp": [{}, {"template": {"belly_radius": 33.0}}, {}]}, "cusp.1.template.belly_radius"),
+        (
+            {"cusp": [{}, {}, {"template": {"free_edge_height": -12.0}}]},
+            "cusp.2.template.free_edge_height",
+        ),
+        ({"commissures": {"chord_ratio": [1.0, 2.0, 3.5]}}, "commissures.chord_ratio"),
+        ({"commissures": {"gap": 26.0}}, "commissures.gap"),
+        ({"template": {"free_edge_length": 120.0}}, "template.free_edge_length"),
+        ({"root": {"radius": 40.0}}, "template.free_edge_length"),
+        (
+            {
+                "cusp": [{"template": {"free_edge_length": 120.0}}, {}, {}],
+                "stitching": {"gather_ratio": 9.0},
+            },
+            "cusp.0.template.free_edge_length",
+        ),
+        # the order of the checks: template before chords before gap before stitching
+        (
+            {"template": {"belly_radius": 33.0}, "commissures": {"chord_ratio": [1.0, 1.0, 3.0]}},
+            "template.belly_radius",
+        ),
+        ({"commissures": {"chord_ratio": [1.0, 1.0, 3.0], "gap": 99.0}}, "commissures.chord_ratio"),
+        (
+            {"commissures": {"gap": 99.0}, "template": {"free_edge_length": 120.0}},
+            "commissures.gap",
+        ),
+    ],
+)
+def test_errors_name_their_entry(data: dict[str, Any], key: str) -> None:
+    """Truth: the first violated condition, in the documented order, as the scene names it."""
+    with pytest.raises(SceneError) as caught:
+        build(data)
+    assert caught.value.key == key
+
+
+@pytest.mark.parametrize(
+    ("data", "low_is_sharp"),
+    # in the first the CSL at L_f = 2 R_s, where the branch ends, is longer than the ASL already
+    [({"template": {"free_edge_length": 120.0}}, False), ({"root": {"radius": 32.0}}, True)],
+)
+def test_stitching_advice_works(data: dict[str, Any], low_is_sharp: bool) -> None:
+    """Truth: free edge lengths just inside the offered interval can be stitched, outside not."""
+    with pytest.raises(SceneError) as caught:
+        build(data)
+    words = caught.value.valid.rsplit("; between ", 1)[1].split()
+    low, high = float(words[0]), float(words[2])
+    for length in (low * 1.001, high * 0.999):
+        build({**data, "template": {"free_edge_length": length}})
+    for length in [high * 1.001, low * 0.999][: 1 + low_is_sharp]:
+        with pytest.raises(SceneError, match="J_sl"):
+            build({**data, "template": {"free_edge_length": length}})
+
+
+def test_stitching_without_a_free_edge_that_would_do() -> None:
+    """Truth: when pi R_s + 2 H_i alone is too long, the error blames those and not L_f."""
+    with pytest.raises(SceneError, match="no free_edge_length would do") as caught:
+        build({"root": {"radius": 4.0}, "stitching": {"gather_ratio": 2.0}})
+    limit = float(caught.value.valid.rsplit("below ", 1)[1].split()[0])
+    assert np.pi * 16.5 + 23.0 > limit
+
+
+def test_gap_limit_is_sharp() -> None:
+    """Truth: the gap may take up all but the whole arc of the smallest cusp, 2 R alpha_min."""
+    with pytest.raises(SceneError, match="cusp 1") as caught:
+        build({"commissures": {"chord_ratio": [6.0, 4.0, 5.0], "gap": 24.0}})
+    alpha = np.arccos((36.0 + 25.0 - 16.0) / 60.0)
+    assert f"{24.0 * alpha:.6g} mm" in caught.value.valid
+
+
+def test_import_is_light() -> None:
+    """Truth: geometry needs neither the finite-element stack nor the mesher."""
+    code = (
+        "import sys, avneo_fem.geometry.valve_geometry;"
+        "print(sorted({'dolfinx', 'gmsh', 'petsc4py', 'mpi4py', 'pyvista'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.strip() == "[]"
