@@ -74,10 +74,14 @@ install_packages() {
         -o DPkg::Lock::Timeout=600 -o Acquire::Retries=3 -o APT::Keep-Downloaded-Packages=false)
     local began=$SECONDS
     say "Debian packages missing: ${missing[*]} (a few minutes)"
-    # dpkg may have been killed half way through; this does nothing otherwise.
-    run_logged "$work/dpkg.log" "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-        dpkg --configure -a --force-confold
     run_logged "$work/apt-update.log" "${apt[@]}" update
+    if [ -n "$(dpkg --audit)" ]; then
+        say "repairing an interrupted installation of packages"
+        # It may stop at a package whose dependencies were never unpacked: apt-get fetches them.
+        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive dpkg --configure -a --force-confold \
+            >"$work/dpkg.log" 2>&1 </dev/null || true
+        run_logged "$work/apt-fix.log" "${apt[@]}" install --fix-broken --no-install-recommends
+    fi
     run_logged "$work/apt-install.log" "${apt[@]}" install --no-install-recommends "${missing[@]}"
     sed -n -E 's/^(.*newly installed).*|^(Need to get .*)|^(After this operation.*)/set-up:   \1\2\3/p' \
         "$work/apt-install.log"

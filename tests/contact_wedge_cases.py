@@ -85,7 +85,7 @@ def brute_distance(polygons, points, samples=4000, neighbours=3):
         away = points - polygon[3] - s[:, None] * direction
         best = np.minimum(best, np.hypot(away[:, 0], away[:, 1]))
         grid = np.unique(np.r_[np.linspace(0, 1, samples), np.geomspace(1e-12, 0.01, 200)])
-        _, near = cKDTree(bezier(polygon, grid)).query(points, k=neighbours)
+        _, near = cKDTree(bezier(polygon, grid)).query(points, k=np.arange(1, neighbours + 1))
         for index in near.T:
             low, high = grid[np.maximum(index - 1, 0)], grid[np.minimum(index + 1, grid.size - 1)]
             for _ in range(45):  # thirds

@@ -57,7 +57,7 @@ def at(picture: np.ndarray, view: int, x: float, y: float) -> str:
     scale = SIZE[1] / (2.0 * 1.3 * RADIUS)  # pixels per mm
     across = column * (view + 0.5) + (scale * x if view == 0 else -scale * x)
     red, green, blue = picture[round(SIZE[1] / 2.0 - scale * y), round(across)]
-    hue, _, saturation = colorsys.rgb_to_hls(red, green, blue)
+    hue = colorsys.rgb_to_hls(red, green, blue)[0]
     if max(red, green, blue) - min(red, green, blue) < 0.05:
         return "grey"
     return min(HUES, key=lambda name: abs((360.0 * hue - HUES[name] + 180.0) % 360.0 - 180.0))

@@ -33,9 +33,9 @@ def _reference(power):
 def test_random_polynomials_against_companion_eigenvalues(degree):
     """Truth: the least value over all real roots from numpy.roots and the two ends."""
     rng = np.random.default_rng(degree)
-    roots = rng.uniform(-0.3, 1.3, (degree, 1500))
-    power = np.stack([np.poly(r)[::-1] for r in roots.T], axis=1) * rng.choice([-1, 1], 1500)
-    power[:, ::3] = rng.normal(size=(degree + 1, 500))
+    roots = rng.uniform(-0.3, 1.3, (degree, 600))
+    power = np.stack([np.poly(r)[::-1] for r in roots.T], axis=1) * rng.choice([-1, 1], 600)
+    power[:, ::3] = rng.normal(size=(degree + 1, 200))
     u, stationary = _minimise(power)
     scale = np.abs(power).sum(axis=0)
     assert u.min() >= 0.0
@@ -79,6 +79,15 @@ def test_double_triple_and_quintuple_roots():
     assert abs(u[0] - 0.8) < 1e-12
     u, _ = _minimise(np.poly([0.37, 0.37])[::-1][:, None])  # f >= 0: smallest at 0
     assert u[0] == 0.0
+
+
+def test_falling_root_at_the_very_start():
+    """Truth: u (u - 1/2) has its minimum at 1/2, although 0 is a root as well (and so nearly)."""
+    for shift in (0.0, 1e-18, -1e-18, 1e-15, -1e-15):
+        for exact in (np.array([shift, -0.5, 1.0]), np.array([shift, 0.0, -0.5, 1.0])):
+            u, stationary = _minimise(exact[:, None])
+            assert stationary[0]
+            assert abs(u[0] - 0.5) < 1e-12
 
 
 def test_ends_and_degenerate_input():

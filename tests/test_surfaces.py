@@ -73,10 +73,15 @@ def test_a_failed_writer_keeps_the_old_file(tmp_path):
         temporary.write_text("old")
         assert (temporary.parent, temporary.suffix) == (tmp_path, ".json")
         assert not path.exists()
-    with pytest.raises(RuntimeError, match="half way"), written_whole(path) as temporary:
-        temporary.write_text("new")
-        assert path.read_text() == "old"
-        raise RuntimeError("half way")
+
+    def write_half() -> None:
+        with written_whole(path) as temporary:
+            temporary.write_text("new")
+            assert path.read_text() == "old"
+            raise RuntimeError("half way")
+
+    with pytest.raises(RuntimeError, match="half way"):
+        write_half()
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [
         ("report.json", "old")
     ]

@@ -40,10 +40,13 @@ def boundary(template: CuspTemplate, count: int) -> np.ndarray:
 def crossings(polygon: np.ndarray) -> int:
     """Properly crossing pairs of sides, by orientation of all pairs."""
     a, b = polygon, np.roll(polygon, -1, axis=0)
+    rounding = 1e-13 * np.ptp(polygon, axis=0).max() ** 2
 
     def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
         u, v = q - p, r - p
-        return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+        doubled_area = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+        # sides of one straight part are in line up to rounding; that is no crossing
+        return np.where(np.abs(doubled_area) < rounding, 0.0, doubled_area)
 
     one = side(a[:, None], b[:, None], a) * side(a[:, None], b[:, None], b)
     return int(np.count_nonzero((one < 0.0) & (one.T < 0.0)))

@@ -343,7 +343,7 @@ BOUNDS = Constraints(
     wedge_inside=np.array([0.0, 0.0]),
     plane_point=np.zeros(3),
     plane_normal=np.array([0.0, 0.0, 1.0]),
-    free_edge_clearance=0.0,
+    free_edge_clearance=0.1,
     taper=0.5,
 )
 
@@ -353,14 +353,18 @@ def test_verify_valve_of_flat_patches():
     surfaces = [patch(0.2), patch(1.0), patch(2.5)]
     valve = verify_valve(surfaces, [BOUNDS] * 3, [1e-9, 2e-9, 3e-9])
     assert [cusp.residual for cusp in valve.cusps] == [1e-9, 2e-9, 3e-9]
-    assert [cusp.free_edge_sag_mm for cusp in valve.cusps] == pytest.approx([0.3, 0.0, 0.0])
+    assert [cusp.free_edge_sag_mm for cusp in valve.cusps] == pytest.approx([0.4, 0.0, 0.0])
     for cusp in valve.cusps:
         assert (cusp.suture_error_mm, cusp.outside_root_mm, cusp.outside_wedge_mm) == (0, 0, 0)
         assert (cusp.clamp_error_deg, cusp.self_intersections) == ((0.0, 0.0), 0)
     assert (valve.cusp_intersections, valve.min_distance_mm) == (0, pytest.approx(0.8))
     assert valve.min_wall_distance_mm == pytest.approx(2.0 - np.sqrt(2.0))
+    upside_down = replace(surfaces[0], distance_to_suture=1.0 - surfaces[0].distance_to_suture)
+    only_lower_half = verify_valve([upside_down], [BOUNDS], [0.0])
+    assert only_lower_half.min_wall_distance_mm == pytest.approx(2.0 - np.sqrt(1.25))
+    assert only_lower_half.min_distance_mm == np.inf
     [failure] = judge(valve, Tolerances(residual=1e-8))
-    assert failure == "cusp 0: free edge sags by 0.3 mm, allowed 0.1 mm"
+    assert failure == "cusp 0: free edge sags by 0.4 mm, allowed 0.1 mm"
 
 
 def test_verify_valve_of_crossing_patches():

@@ -69,7 +69,8 @@ class ContactWedge:
         distance, normal, bending = self.section.signed_distance(self.frame.project(points))
         gradient = normal @ self.frame.basis.T
         across = np.stack([-normal[:, 1], normal[:, 0]], axis=1) @ self.frame.basis.T
-        hessian = (bending[:, None] * across)[:, :, None] * across[:, None, :]
+        hessian = across[:, :, None] * across[:, None, :]
+        hessian *= bending[:, None, None]
         return distance, gradient, hessian
 
     def curve(self, n_per_piece: int = 200, extension: float = 10.0) -> Array:

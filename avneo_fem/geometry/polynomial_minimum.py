@@ -132,8 +132,9 @@ def _rising_root(power: Array) -> Array:
             low, high = np.where(below, u, low), np.where(below, high, u)
             newton = u - value / slope
             step = np.abs(newton - u)
-            good = (newton >= low) & (newton <= high) & (step <= 0.5 * previous)
-            tiny = step <= _TOLERANCE
+            rising = slope > 0.0  # f(0) may be 0 without the rising root being there
+            good = rising & (newton >= low) & (newton <= high) & (step <= 0.5 * previous)
+            tiny = rising & (step <= _TOLERANCE)
             u = np.where(good | tiny, newton, 0.5 * (low + high))
             previous = np.where(good, step, high - low)
             # written so that a NaN, which no bracket can hold, also ends

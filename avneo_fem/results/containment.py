@@ -59,7 +59,7 @@ def _closed_far_away(polyline: Array, extent: float) -> Array:
         ends.append(end + direction * (np.sqrt(along**2 - across) - along))
     start, stop = (np.arctan2(*(point - middle)[::-1]) for point in ends)
     # which way round does not matter: only whether two points are on the same side does
-    angle = np.linspace(stop, start + (2.0 * np.pi if start < stop else 0.0), 34)[1:-1]
+    angle = np.linspace(stop, start, 34)[1:-1]
     arc = middle + far * np.column_stack([np.cos(angle), np.sin(angle)])
     return np.vstack([ends[0], polyline, ends[1], arc])
 
