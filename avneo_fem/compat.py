@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 _set_flags: Callable[[int], None] = sys.setdlopenflags
 _log_level, _log_handlers = logging.root.level, list(logging.root.handlers)
@@ -40,11 +41,17 @@ __all__ = [
     "clear_stale_kernels",
     "compile_form",
     "create_mesh",
+    "edge_tags",
     "fem",
     "fem_petsc",
+    "function_space",
     "install_abort_on_error",
+    "kernel_cache",
+    "match_points",
     "mixed_space",
+    "scalar_element",
     "ufl",
+    "vector_element",
     "versions",
 ]
 
@@ -53,8 +60,10 @@ logging.root.setLevel(_log_level)
 logging.root.handlers[:] = _log_handlers
 
 PETSC_ERROR = PETSc.Error
-_HAS_BASIX_UFL = hasattr(basix, "ufl")
+_elements: Any = getattr(basix, "ufl", None)  # absent from 0.5.2, whose elements are UFL's own
+_form: Any = fem.form
 _JIT = {"cffi_extra_compile_args": ["-O2", "-g0"], "timeout": 600}
+_JIT_KEYWORD = "jit_params" if _elements is None else "jit_options"
 
 
 def kernel_cache() -> Path:
@@ -85,34 +94,60 @@ def clear_stale_kernels(older_than_s: float = 600.0) -> int:
 
 def compile_form(form: Any) -> Any:
     """Compile a UFL form with this project's compiler flags (cached on disk by signature)."""
-    if _HAS_BASIX_UFL:
-        return fem.form(form, jit_options=_JIT)
-    return fem.form(form, jit_params=_JIT)
+    return _form(form, **{_JIT_KEYWORD: _JIT})
 
 
 def create_mesh(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Any:
     """Serial DOLFINx mesh of ``points (n, 2)`` and ``triangles (m, 3)`` on this process."""
     cells = np.ascontiguousarray(triangles, dtype=np.int64)
-    if _HAS_BASIX_UFL:
-        element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,))
-        return mesh.create_mesh(MPI.COMM_SELF, cells, points, ufl.Mesh(element))
-    cell = ufl.Cell("triangle", geometric_dimension=2)
-    return mesh.create_mesh(
-        MPI.COMM_SELF, cells, points, ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1))
-    )
+    if _elements is not None:
+        element = _elements.element("Lagrange", "triangle", 1, shape=(2,))
+    else:
+        cell = ufl.Cell("triangle", geometric_dimension=2)
+        element = ufl.VectorElement("Lagrange", cell, 1)
+    return mesh.create_mesh(MPI.COMM_SELF, cells, points, ufl.Mesh(element))
+
+
+def match_points(coordinates: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[Any]:
+    """Row of ``coordinates`` (k, 2 or 3) at each of the plane ``points`` (n, 2), as (n,) int64.
+
+    Raises
+    ------
+    RuntimeError
+        When a point has no row of its own within 1e-8 mm.
+    """
+    distance, rows = cKDTree(coordinates[:, :2]).query(points)
+    if distance.max() > 1e-8 or len(np.unique(rows)) != len(points):
+        raise RuntimeError("finite-element nodes do not match the mesh they were made from")
+    return rows.astype(np.int64)
+
+
+def edge_tags(domain: Any, midpoints: NDArray[np.float64], tag: int) -> Any:
+    """Mesh tags that mark the edges with these ``midpoints`` (n, 2) by ``tag``.
+
+    Raises
+    ------
+    RuntimeError
+        When there is no edge at one of the midpoints.
+    """
+    domain.topology.create_entities(1)
+    domain.topology.create_connectivity(1, 2)
+    edges = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
+    chosen = np.sort(edges[match_points(mesh.compute_midpoints(domain, 1, edges), midpoints)])
+    return mesh.meshtags(domain, 1, chosen, np.full(len(chosen), tag, dtype=np.int32))
 
 
 def vector_element(domain: Any, family: str, dimension: int = 3) -> Any:
     """Lowest-order element with vector values (``family``: "Lagrange" or "CR")."""
-    if _HAS_BASIX_UFL:
-        return basix.ufl.element(family, "triangle", 1, shape=(dimension,))
+    if _elements is not None:
+        return _elements.element(family, "triangle", 1, shape=(dimension,))
     return ufl.VectorElement(family, domain.ufl_cell(), 1, dim=dimension)
 
 
 def scalar_element(domain: Any, family: str) -> Any:
     """Lowest-order scalar element."""
-    if _HAS_BASIX_UFL:
-        return basix.ufl.element(family, "triangle", 1)
+    if _elements is not None:
+        return _elements.element(family, "triangle", 1)
     return ufl.FiniteElement(family, domain.ufl_cell(), 1)
 
 
@@ -124,8 +159,8 @@ def function_space(domain: Any, element: Any) -> Any:
 
 def mixed_space(domain: Any, elements: list[Any]) -> Any:
     """Function space of a mixed element."""
-    if _HAS_BASIX_UFL:
-        return function_space(domain, basix.ufl.mixed_element(elements))
+    if _elements is not None:
+        return function_space(domain, _elements.mixed_element(elements))
     return function_space(domain, ufl.MixedElement(elements))
 
 

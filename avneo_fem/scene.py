@@ -170,7 +170,7 @@ class Wall(_Table):
         None, description="distance over which d_0 grows from the suture [mm]; default 5 H"
     )
     growth: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
-        2.0, description="factor by which eta_1 is raised until the cusp is inside"
+        4.0, description="factor by which eta_1 is raised until the cusp is inside"
     )
     maximum_stiffness: Positive = Field(4096.0, description="eta_1 is not raised beyond [kPa]")
 
@@ -195,7 +195,7 @@ class Solver(_Table):
         1e-8, description="final residual relative to the pressure load P x area"
     )
     path_tolerance: Positive = Field(
-        1e-3, description="the same for states on the way (damped, not final)"
+        1e-4, description="the same for the equilibria on the way"
     )
     boundary_steps: Annotated[int, Field(ge=1)] = Field(
         20, description="nominal steps of the sutured edge from template to suture line"
@@ -212,7 +212,9 @@ class Solver(_Table):
     barrier_distance: Positive | None = Field(
         None, description="self-contact acts below it [mm]; default min(0.3 H, 0.2 h)"
     )
-    barrier_stiffness: Positive = Field(1000.0, description="self-contact stiffness")
+    barrier_stiffness: Positive = Field(
+        0.05, description="self-contact stiffness in units of E H over barrier_distance squared"
+    )
     inside_tolerance: Positive = Field(
         0.05, description="wedge and wall may be short of their clearance by [mm]"
     )

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from avneo_fem.errors import SceneError
-from avneo_fem.geometry.contact_curve import curve_length
-from avneo_fem.geometry.contact_wedge import ContactWedge, ContactWedgeFamily
 from contact_wedge_cases import (
     EXPERIMENTS,
     brute_distance,
@@ -18,6 +15,10 @@ from contact_wedge_cases import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
+from avneo_fem.errors import SceneError
+from avneo_fem.geometry.contact_curve import curve_length
+from avneo_fem.geometry.contact_wedge import ContactWedge, ContactWedgeFamily
 
 FAMILIES = {number: ContactWedgeFamily(*inputs(number)) for number in EXPERIMENTS}
 LAMBDAS = np.linspace(0.0, 1.0, 11)
@@ -69,16 +70,16 @@ def _check_brute_force(number, cusp, lam, count, seed):
 @pytest.mark.parametrize(("cusp", "lam"), [(0, 0.5), (1, 1.0), (2, 0.8)])
 def test_distance_and_sign_by_brute_force(number, cusp, lam):
     """Truth: refined dense samples of (3.5); the even-odd rule."""
-    _check_brute_force(number, cusp, lam, 3000, cusp)
+    _check_brute_force(number, cusp, lam, 2000, cusp)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", EXPERIMENTS)
 @pytest.mark.parametrize("cusp", [0, 1, 2])
 @pytest.mark.parametrize("lam", LAMBDAS)
-def test_distance_and_sign_by_brute_force_on_a_hundred_thousand_points(number, cusp, lam):
-    """Truth: as above; 99 wedges with 10^5 points each."""
-    _check_brute_force(number, cusp, lam, 100_000, 77)
+def test_distance_and_sign_by_brute_force_everywhere(number, cusp, lam):
+    """Truth: as above; 99 wedges with 10^4 points each."""
+    _check_brute_force(number, cusp, lam, 10_000, 77)
 
 
 @pytest.mark.parametrize("number", EXPERIMENTS)
@@ -86,7 +87,7 @@ def test_sign_near_and_behind_the_apex(number):
     """Truth: the even-odd rule on a polygon graded to the apex, 1e-3 ... 1e-9 mm from it."""
     angle = np.linspace(0.0, 2 * np.pi, 180)
     circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    for lam in (*LAMBDAS[::2], 1 - 1e-6, 1e-6):
+    for lam in (0.0, 1e-6, 0.3, 0.6, 1 - 1e-6, 1.0):
         for cusp in range(3):
             polygons = _polygons(number, cusp, lam)
             apex = np.append(polygons[0, 0], 0.0)
@@ -132,6 +133,28 @@ def test_short_cusps_give_straight_contact_lines():
         np.testing.assert_allclose(family.wedge(i, 1.0).signed_distance(points), exact, atol=1e-13)
 
 
+@pytest.mark.parametrize("share", [1e-3, 1e-7, 1e-11, 1e-15])
+def test_nearly_straight_curves(share):
+    """Truth: refined samples and the even-odd rule, where the start of the curve all but stops:
+    lambda next to 1 with sigma = 0, and tiny sigma at lambda = 1."""
+    flat, centre, normal, lengths = inputs(3)
+    spans = np.linalg.norm(flat - centre, axis=1)
+    points = _points(np.random.default_rng(9), 300)
+    points[::2] = centre + points[::2] * 1e-4
+    for c, lam in ((0.9 * lengths, 1.0 - share), (spans * (1.0 + share), 1.0)):
+        family = ContactWedgeFamily(flat, centre, normal, c)
+        for cusp in range(3):
+            wedge = family.wedge(cusp, lam)
+            distance, gradient, hessian = wedge.evaluate(points)
+            assert np.isfinite(hessian).all()
+            polygons = wedge.section.polygons
+            brute = brute_distance(polygons, points[:, :2], 500, 2)
+            np.testing.assert_allclose(np.abs(distance), brute, atol=1e-10)
+            np.testing.assert_allclose(np.linalg.norm(gradient, axis=1), 1.0, atol=1e-14)
+            clear = brute > 1e-7
+            assert np.array_equal(distance[clear] > 0, inside(polygons, points[:, :2])[clear])
+
+
 @pytest.mark.parametrize("number", EXPERIMENTS)
 def test_contact_wedges_tile_the_plane(number):
     """Truth: at lambda = 1 neighbouring wedges share their curves: one positive distance, and the
@@ -175,7 +198,7 @@ def test_gradient_and_hessian_by_finite_differences(number):
         np.testing.assert_allclose(bend[smooth], hessian[smooth], atol=1e-4)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3),
     shift=st.tuples(*[st.floats(-50.0, 50.0)] * 3),
@@ -285,10 +308,8 @@ def test_bad_wedges_are_named():
     ends, lengths = commissures((4.1, 4.8, 8.4)), np.array([9.8, 19.1, 32.5])
     flat, centre = np.pad(ends, ((0, 0), (0, 1))), np.append(triple_point(ends, lengths), 0.0)
     family = ContactWedgeFamily(flat, centre, np.array([0.0, 0.0, 1.0]), lengths)
-    with pytest.raises(SceneError, match="cross each other at lambda"):
-        for cusp in range(3):
-            for lam in LAMBDAS:
-                family.wedge(cusp, lam)
+    with pytest.raises(SceneError, match=r"cusp 0 cross each other at lambda = 0\.7"):
+        family.wedge(0, 0.7)
 
 
 def test_frozen():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from avneo_fem.geometry.polynomial_minimum import (
     bernstein_from_power,
     minimise_on_unit_interval,

@@ -22,6 +22,12 @@ def _edge_tangents(model: ShellModel, points: Floats) -> Floats:
     return _unit(points[edges[:, 1]] - points[edges[:, 0]])
 
 
+def _suture_sense(model: ShellModel) -> Floats:
+    """(k-1, 1): 1 where a suture edge is stored along the suture line, -1 where against it."""
+    line = model.mesh.suture_line
+    return np.where(line[:-1] < line[1:], 1.0, -1.0)[:, None]
+
+
 def _across(vectors: Floats, tangent: Floats) -> Floats:
     """Unit part of ``vectors`` orthogonal to ``tangent``."""
     return _unit(vectors - np.einsum("ed,ed->e", vectors, tangent)[:, None] * tangent)
@@ -71,12 +77,19 @@ def clamp_rotation(model: ShellModel, state: Floats, conormal: Floats) -> Floats
     Parameters
     ----------
     conormal : (k-1, 3) array
-        Prescribed outward conormal b of every suture edge: the cusp leaves along -b (3.1).
+        Prescribed outward conormal b of every suture edge: the cusp leaves along -b (3.1). Its
+        part along the edge is ignored.
+
+    Returns
+    -------
+    (k-1,) array in (-pi, pi]
+        Positive about the edge as stored in ``mesh.edges``: added to the edge's entries of
+        ``angle_dofs`` it makes the current director the clamped one.
     """
     edges = model.mesh.suture_edges
-    # edges are stored smaller index first, which along the suture line is its own direction
     tangent = _edge_tangents(model, state[model.position_dofs])[edges]
-    wanted = _across(np.cross(conormal, tangent), tangent)
+    # the suture line has the cusp on its left, so normal = b x (direction of the line)
+    wanted = _across(np.cross(conormal, _suture_sense(model) * tangent), tangent)
     now = current_directors(model, state)[edges]
     sine = np.einsum("ed,ed->e", np.cross(now, wanted), tangent)
     return np.arctan2(sine, np.einsum("ed,ed->e", now, wanted))

@@ -1,4 +1,4 @@
-"""Sparse direct solves by MUMPS through PETSc; the symbolic part is kept while the pattern stays."""
+"""Sparse direct solves by MUMPS through PETSc; a pattern that stays is analysed once."""
 
 from __future__ import annotations
 

@@ -194,9 +194,7 @@ class NewtonSolver:
         iterations = snes.getIterationNumber()
         self.iterations += iterations
         result = self._full(x)
-        residual = float(
-            np.linalg.norm(system.residual(result, extra)[self._free]) / self._scale
-        )
+        residual = float(np.linalg.norm(system.residual(result, extra)[self._free]) / self._scale)
         snes.destroy()
         text = _REASONS.get(reason, f"SNES reason {reason}")
         seconds = time.perf_counter() - clock

@@ -74,6 +74,10 @@ class ShellModel:
         Flat template, which is the stress-free state.
     parameters : ShellParameters
         Constants of the model.
+
+    Notes
+    -----
+    Directors start as the template's normal e_3; ``equilibrium.directors`` moves them.
     """
 
     def __init__(self, mesh: CuspMesh, parameters: ShellParameters) -> None:
@@ -86,7 +90,7 @@ class ShellModel:
             position_space, position_map = self.space.sub(0).collapse()
             angle_space, angle_map = self.space.sub(1).collapse()
             midpoints = mesh.points[mesh.edges].mean(axis=1)
-            rows = _match(angle_space.tabulate_dof_coordinates(), midpoints)
+            rows = compat.match_points(angle_space.tabulate_dof_coordinates(), midpoints)
             self.angle_dofs = np.asarray(angle_map, dtype=np.int64)[rows]
             self._director, rows = self._edge_function(midpoints, 3)
             self._director_rows = rows
@@ -94,11 +98,12 @@ class ShellModel:
             along = np.diff(mesh.points[mesh.edges], axis=1)[:, 0]
             along /= np.linalg.norm(along, axis=1, keepdims=True)
             self._direction.x.array.reshape(-1, 2)[rows] = along
+            self.set_directors(np.tile([0.0, 0.0, 1.0], (len(midpoints), 1)))
         else:
             self.space = compat.function_space(self.domain, position_element)
             position_space, position_map = self.space, np.arange(3 * len(mesh.points))
             self.angle_dofs = np.empty(0, dtype=np.int64)
-        nodes = _match(position_space.tabulate_dof_coordinates(), mesh.points)
+        nodes = compat.match_points(position_space.tabulate_dof_coordinates(), mesh.points)
         blocks = 3 * nodes[:, None] + np.arange(3)
         self.position_dofs: Ints = np.asarray(position_map, dtype=np.int64)[blocks]
         self._compile()
@@ -119,31 +124,26 @@ class ShellModel:
         gradient = ufl.grad(position)
         dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 1})
         dx2 = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 2})
+        ends = self.mesh.points[self.mesh.free_edge]
+        tags = compat.edge_tags(domain, (ends[:-1] + ends[1:]) / 2, _FREE_EDGE)
         ds = ufl.Measure(
-            "ds",
-            domain=domain,
-            subdomain_data=self._free_edge_tags(),
-            metadata={"quadrature_degree": 2},
+            "ds", domain=domain, subdomain_data=tags, metadata={"quadrature_degree": 2}
         )(_FREE_EDGE)
         material = material_named(p.material, c["young_modulus"])
         energy = membrane_energy_density(gradient, material, c["thickness"]) * dx
         if p.bending:
             rigidity = c["young_modulus"] * c["thickness"] ** 3 / 12
-            energy += (
-                bending_energy_density(
-                    domain, position, angle, self._director, self._direction, rigidity
-                )
-                * dx
+            bending = bending_energy_density(
+                domain, position, angle, self._director, self._direction, rigidity
             )
+            energy += bending * dx
         height = ufl.dot(position - c["plane_point"], c["plane_normal"]) - (
             ufl.SpatialCoordinate(domain)[1] - c["template_level"]
         )
-        energy += (
-            free_edge_energy_density(
-                height, c["free_edge_load"], c["free_edge_width"], c["free_edge_clearance"]
-            )
-            * ds
+        support = free_edge_energy_density(
+            height, c["free_edge_load"], c["free_edge_width"], c["free_edge_clearance"]
         )
+        energy += support * ds
         test, trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
         residual = ufl.derivative(energy, self._state, test)
         virtual = test if not p.bending else ufl.split(test)[0]
@@ -161,54 +161,13 @@ class ShellModel:
         """Crouzeix-Raviart vector function and the row of its array for each edge."""
         element = compat.vector_element(self.domain, "CR", dimension)
         space = compat.function_space(self.domain, element)
-        return fem.Function(space), _match(space.tabulate_dof_coordinates(), midpoints)
+        return fem.Function(space), compat.match_points(space.tabulate_dof_coordinates(), midpoints)
 
     def _constant(self, value: Any) -> Any:
         return fem.Constant(self.domain, np.asarray(value, dtype=PETSc.ScalarType))
 
     def _split(self, function: Any) -> tuple[Any, Any]:
         return ufl.split(function) if self.parameters.bending else (function, None)
-
-    def _free_edge_tags(self) -> Any:
-        from dolfinx.mesh import locate_entities_boundary, meshtags
-
-        topology = self.domain.topology
-        topology.create_connectivity(1, 2)
-        topology.create_connectivity(1, 0)
-        on_boundary = locate_entities_boundary(
-            self.domain, 1, lambda x: np.full(x.shape[1], True)
-        )
-        rows = _match(self.domain.geometry.x, self.mesh.points)
-        free = np.zeros(len(rows), dtype=bool)
-        free[rows[self.mesh.free_edge]] = True
-        x = self.domain.geometry.x
-        vertices = np.array([topology.connectivity(1, 0).links(f) for f in on_boundary])
-        to_geometry = self._vertex_to_geometry()
-        ends = to_geometry[vertices]
-        both = free[ends].all(axis=1)
-        # a suture edge can have both ends on the free edge only at a corner of one triangle
-        pairs = {
-            tuple(sorted((a, b)))
-            for a, b in zip(
-                rows[self.mesh.free_edge][:-1], rows[self.mesh.free_edge][1:], strict=True
-            )
-        }
-        exact = np.array([tuple(sorted(map(int, pair))) in pairs for pair in ends])
-        facets = np.sort(on_boundary[both & exact]).astype(np.int32)
-        assert len(facets) == len(self.mesh.free_edge) - 1, (len(facets), x.shape)
-        return meshtags(self.domain, 1, facets, np.full(len(facets), _FREE_EDGE, dtype=np.int32))
-
-    def _vertex_to_geometry(self) -> Ints:
-        topology = self.domain.topology
-        topology.create_connectivity(2, 0)
-        cells = topology.connectivity(2, 0)
-        dofmap = self.domain.geometry.dofmap
-        count = topology.index_map(2).size_local
-        geometry = np.asarray(getattr(dofmap, "array", dofmap)).reshape(count, -1)
-        table = np.zeros(topology.index_map(0).size_local, dtype=np.int64)
-        vertices = np.array([cells.links(c) for c in range(count)])
-        table[vertices] = geometry
-        return table
 
     # -- constants -------------------------------------------------------------------------
     @property
@@ -234,7 +193,7 @@ class ShellModel:
 
     def set_directors(self, directors: Floats) -> None:
         """Reference directors p_e, (e, 3) unit vectors in the order of ``mesh.edges``."""
-        self.directors = directors
+        self.directors = directors.copy()
         self._director.x.array.reshape(-1, 3)[self._director_rows] = directors
 
     # -- assembly --------------------------------------------------------------------------
@@ -274,13 +233,3 @@ class ShellModel:
         self._matrix.assemble()
         rows, columns, values = self._matrix.getValuesCSR()
         return sp.csr_matrix((values, columns, rows), shape=(self.size, self.size))
-
-
-def _match(coordinates: Floats, points: Floats) -> Ints:
-    """Row of ``coordinates`` (k, 3) at each of ``points`` (n, 2)."""
-    from scipy.spatial import cKDTree
-
-    distance, rows = cKDTree(coordinates[:, :2]).query(points)
-    if distance.max() > 1e-8 or len(np.unique(rows)) != len(points):
-        raise RuntimeError("finite-element nodes do not match the mesh they were made from")
-    return rows.astype(np.int64)

@@ -8,7 +8,8 @@ alpha_e. Against a triangle T with normal n and outward conormal mu = t x n it s
 
 and the curvature of T is the tensor whose normal moments do the same work as those rotations,
 
-    kappa_T = 1/|T| sum_e l_e theta_e^T nu_e (x) nu_e,   W = D/2 |T| kappa_T : kappa_T,  D = E H^3/12.
+    kappa_T = 1/|T| sum_e l_e theta_e^T nu_e (x) nu_e,
+    W_T = D/2 |T| kappa_T : kappa_T,   D = E H^3/12.
 
 This is the lowest-order Hellan-Herrmann-Johnson shell with the moments eliminated and the edge
 rotation kept (cf. Neunteufel & Schoeberl, Comput. Struct. 225 (2019) 106109; Grinspun et al.,

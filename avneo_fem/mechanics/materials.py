@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from avneo_fem.compat import ufl
+from avneo_fem.errors import SceneError
 
 __all__ = ["Material", "NeoHookean", "StVenantKirchhoff", "material_named"]
 
@@ -51,6 +52,16 @@ class NeoHookean:
 
 
 def material_named(model: str, young_modulus: Any) -> Material:
-    """Material for the scene entry ``material.model``."""
-    models = {"neo_hookean": NeoHookean, "st_venant_kirchhoff": StVenantKirchhoff}
-    return models[model](young_modulus)
+    """Material for the scene entry ``material.model``; E [kPa] may be a number or a UFL constant.
+
+    Raises
+    ------
+    SceneError
+        When there is no material of that name.
+    """
+    if model == "neo_hookean":
+        return NeoHookean(young_modulus)
+    if model == "st_venant_kirchhoff":
+        return StVenantKirchhoff(young_modulus)
+    valid = "must be 'neo_hookean' or 'st_venant_kirchhoff'"
+    raise SceneError("material.model", model, valid)

@@ -1,0 +1,118 @@
+"""The report of a run: what was asked for, what came out, and whether it was verified."""
+
+from __future__ import annotations
+
+import json
+import math
+import resource
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from avneo_fem import __version__
+from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.valve_geometry import ValveGeometry
+from avneo_fem.results.verdict import ValveVerification
+from avneo_fem.results.writing import written_whole
+from avneo_fem.scene import Scene
+from avneo_fem.stages.record import CuspResult
+
+__all__ = ["build_report", "geometry_report", "write_report"]
+
+
+def geometry_report(
+    geometry: ValveGeometry, wedges: ContactWedgeFamily
+) -> dict[str, Any]:
+    """The ``geometry`` part of the report (design.md §2); also what ``avneo check`` prints."""
+    plane, triple, cusps = geometry.commissures, geometry.triple_contact, geometry.cusps
+    return {
+        "commissures": plane.points.tolist(),
+        "normal": plane.normal.tolist(),
+        "circumradius": float(plane.circumradius),
+        "chord_lengths": plane.chord_lengths.tolist(),
+        "commissure_lengths": geometry.commissure_lengths.tolist(),
+        "contact_lengths": geometry.contact_lengths.tolist(),
+        "triple_contact_point": triple.point.tolist(),
+        "nu_star": float(triple.nu_star),
+        "triple_point_case": triple.case,
+        "competent": geometry.competent,
+        "competence_reason": geometry.competence_reason,
+        "asl_length": [float(cusp.suture_line.length) for cusp in cusps],
+        "csl_length": [float(cusp.template.suture_length) for cusp in cusps],
+        "stitching_ratio": [float(cusp.stitching.stitching_ratio) for cusp in cusps],
+        "sigma": wedges.sigma.tolist(),
+    }
+
+
+def build_report(
+    scene: Scene,
+    geometry: dict[str, Any],
+    results: list[CuspResult],
+    verification: ValveVerification,
+    failures: list[str],
+    seconds: float,
+    ranks: int,
+    versions: dict[str, str],
+) -> dict[str, Any]:
+    """Assemble report.json (keys as in design.md §2)."""
+    cusps = []
+    for result, measured in zip(results, verification.cusps, strict=True):
+        largest, rms = measured.clamp_error_deg
+        cusps.append(
+            {
+                "index": result.index,
+                "cells": len(result.mesh.triangles),
+                "nodes": len(result.mesh.points),
+                "dofs": result.dofs,
+                "stages": [asdict(record) for record in result.records],
+                **asdict(measured),
+                "clamp_error_deg": {"largest": largest, "rms": rms},
+                "failure": result.failure,
+                "copied_from": result.copied_from,
+            }
+        )
+    compile_seconds = max(result.compile_seconds for result in results)
+    return {
+        "scene": {"name": scene.name, **scene.model_dump(mode="json")},
+        "versions": {"avneo_fem": __version__, **versions},
+        "fidelity": scene.fidelity,
+        "verified": not failures,
+        "failures": failures,
+        "geometry": geometry,
+        "cusps": cusps,
+        "valve": {
+            "cusp_intersections": verification.cusp_intersections,
+            "min_distance_mm": verification.min_distance_mm,
+            "min_wall_distance_mm": verification.min_wall_distance_mm,
+        },
+        "timing": {
+            "total_s": seconds,
+            "jit_s": compile_seconds,
+            "solve_s": sum(result.seconds for result in results),
+            "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            "ranks": ranks,
+        },
+    }
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no NaN or infinity: they become null."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def write_report(path: Path, report: dict[str, Any]) -> str:
+    """Write report.json, whole or not at all; returns its text."""
+    text = json.dumps(_plain(report), indent=2) + "\n"
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return text

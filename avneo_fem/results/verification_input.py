@@ -1,0 +1,75 @@
+"""From scene and result to what the independent judge asks for.
+
+The wedge is handed over as a dense polyline and the wall as a radius: the judge computes its own
+distances.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.valve_geometry import ValveGeometry
+from avneo_fem.results.verdict import Tolerances
+from avneo_fem.results.verify import Constraints, CuspSurface
+from avneo_fem.scene import Scene
+from avneo_fem.stages.record import CuspResult
+
+__all__ = ["constraints_of", "surface_of", "tolerances_of"]
+
+
+def surface_of(geometry: ValveGeometry, result: CuspResult) -> CuspSurface:
+    """Mid-surface of a result and what its edges were asked to do."""
+    mesh, cusp = result.mesh, geometry.cusps[result.index]
+    arc = mesh.suture_arc_length
+    return CuspSurface(
+        points=result.points,
+        triangles=mesh.triangles,
+        suture_nodes=mesh.suture_line,
+        suture_targets=cusp.sutured_position(arc),
+        suture_edges=np.c_[mesh.suture_line[:-1], mesh.suture_line[1:]],
+        prescribed_conormals=cusp.sutured_conormal((arc[1:] + arc[:-1]) / 2),
+        free_edge_nodes=mesh.free_edge,
+        template_height=mesh.points[mesh.free_edge, 1] - cusp.template.corners[0, 1],
+        distance_to_suture=mesh.distance_to_suture,
+        thickness=cusp.thickness,
+    )
+
+
+def constraints_of(
+    scene: Scene, geometry: ValveGeometry, wedges: ContactWedgeFamily, index: int
+) -> Constraints:
+    """What cusp ``index`` must stay within."""
+    line = geometry.cusps[index].suture_line
+    lowest = line.point(np.array([line.length / 2]))[0]
+    thickness = geometry.cusps[index].thickness
+    plane = geometry.commissures
+    return Constraints(
+        radius=geometry.root.radius,
+        wedge=wedges.wedge(index, 1.0).polyline3(2000, 4 * geometry.root.radius)[:, :2],
+        wedge_inside=lowest[:2],
+        plane_point=plane.points[0],
+        plane_normal=plane.normal,
+        free_edge_clearance=scene.free_edge.clearance,
+        taper=5 * thickness if scene.wall.taper is None else scene.wall.taper,
+    )
+
+
+def tolerances_of(scene: Scene, geometry: ValveGeometry) -> Tolerances:
+    """What a verified result of this scene must keep.
+
+    Mid-surfaces of different cusps keep the sum of their clearances, but no more than the
+    sutured edges themselves are apart; the wall its clearance beyond the taper.
+    """
+    halves = sorted(cusp.thickness / 2 for cusp in geometry.cusps)
+    wedge = 2 * halves[0] if scene.contact.clearance is None else 2 * scene.contact.clearance
+    radius, gap = geometry.root.radius, scene.commissures.gap
+    edges_apart = 2 * radius * np.sin(gap / (2 * radius))
+    return Tolerances(
+        residual=scene.solver.tolerance,
+        inside_mm=scene.solver.inside_tolerance,
+        cusp_distance_mm=min(wedge, float(edges_apart)),
+        wall_distance_mm=max(
+            halves[0] if scene.wall.clearance is None else scene.wall.clearance, 0.0
+        ),
+    )

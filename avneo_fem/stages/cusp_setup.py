@@ -1,0 +1,155 @@
+"""Everything the stages of one cusp work with, built from the scene."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avneo_fem.constraints.self_contact import SelfContact
+from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
+from avneo_fem.equilibrium.cusp_system import CuspSystem
+from avneo_fem.equilibrium.newton import NewtonSettings, NewtonSolver
+from avneo_fem.equilibrium.relaxation import Relaxation, RelaxationSettings
+from avneo_fem.equilibrium.shell_model import ShellModel, ShellParameters
+from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.valve_geometry import ValveGeometry
+from avneo_fem.meshing.cusp_mesh import CuspMesh
+from avneo_fem.scene import Scene
+from avneo_fem.stages.placement import place_template
+
+__all__ = ["CuspSetup", "clearances"]
+
+Floats = NDArray[np.float64]
+
+
+def clearances(scene: Scene, index: int, distance_to_suture: Floats) -> tuple[Floats, Floats]:
+    """d_0 of every node from wall and contact wedge [mm] (design.md §1, reading of (1.5)).
+
+    From the wedge half the thickness; from the wall the same, tapered so that the cusp can leave
+    its sutured edge along the wall: H/2 min(1, s/5H)^2 at distance s from the suture.
+    """
+    thickness = scene.cusp[index].template.thickness
+    wedge = thickness / 2 if scene.contact.clearance is None else scene.contact.clearance
+    wall = thickness / 2 if scene.wall.clearance is None else scene.wall.clearance
+    taper = 5 * thickness if scene.wall.taper is None else scene.wall.taper
+    share = np.ones(len(distance_to_suture))
+    if taper > 0:
+        share = np.minimum(1.0, distance_to_suture / taper) ** 2
+    return wall * share, np.full(len(distance_to_suture), wedge)
+
+
+class CuspSetup:
+    """Model, constraints and solver of one cusp; the edge is held from the start.
+
+    Parameters
+    ----------
+    scene, geometry, wedges
+        The valve.
+    index : int
+        Which cusp.
+    mesh : CuspMesh
+        Its triangulated template.
+
+    Attributes
+    ----------
+    start : (n, 3) array
+        Placed flat template; ``placement_k`` is the k of its search.
+    target : (k, 3) array
+        Where the sutured nodes go.
+    conormal : (k-1, 3) array
+        Prescribed outward conormal b of the suture edges.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        geometry: ValveGeometry,
+        wedges: ContactWedgeFamily,
+        index: int,
+        mesh: CuspMesh,
+    ) -> None:
+        self.scene, self.wedges, self.index, self.mesh = scene, wedges, index, mesh
+        self.geometry, self.cusp = geometry, geometry.cusps[index]
+        self.start, self.placement_k = self._place()
+        clock = time.perf_counter()
+        self.model = ShellModel(mesh, self._parameters())
+        self.compile_seconds = time.perf_counter() - clock
+        self.target = self.cusp.sutured_position(mesh.suture_arc_length)
+        middles = (mesh.suture_arc_length[1:] + mesh.suture_arc_length[:-1]) / 2
+        self.conormal = self.cusp.sutured_conormal(middles)
+        self.wall, self.wedge = self._penalties()
+        membrane = scene.material.young_modulus * self.cusp.thickness
+        self.contact = self._self_contact(membrane)
+        self.system = CuspSystem(self.model, self.contact)
+        self.system.fix(self.model.position_dofs[mesh.suture_line])
+        self._solver(membrane / geometry.commissures.circumradius**2)
+
+    def _place(self) -> tuple[Floats, int]:
+        plane, scene, i = self.geometry.commissures, self.scene, self.index
+        line = self.cusp.suture_line
+        return place_template(
+            self.mesh.points,
+            self.mesh.triangles,
+            float(self.cusp.template.corners[0, 1]),
+            (plane.points[(i + 1) % 3], plane.points[(i + 2) % 3]),
+            plane.points[i],
+            plane.normal,
+            plane.circumradius,
+            line.point(np.linspace(0.0, line.length, 500)),
+            scene.placement.c0,
+            scene.placement.c1,
+        )
+
+    def _parameters(self) -> ShellParameters:
+        scene, plane = self.scene, self.geometry.commissures
+        return ShellParameters(
+            material=scene.material.model,
+            bending=scene.material.bending,
+            young_modulus=scene.material.young_modulus,
+            thickness=self.cusp.thickness,
+            pressure=scene.diastolic_pressure,
+            free_edge_stiffness=scene.free_edge.stiffness,
+            free_edge_width=scene.free_edge.width,
+            free_edge_clearance=scene.free_edge.clearance,
+            plane_point=tuple(plane.points[0]),
+            plane_normal=tuple(plane.normal),
+            template_level=float(self.cusp.template.corners[0, 1]),
+        )
+
+    def _penalties(self) -> tuple[SignedDistancePenalty, SignedDistancePenalty]:
+        """Wall and wedge; neither acts until a stage puts it among the system's terms."""
+        scene, mesh = self.scene, self.mesh
+        from_wall, from_wedge = clearances(scene, self.index, mesh.distance_to_suture)
+        options, areas = scene.wall, mesh.node_areas
+        wall = SignedDistancePenalty(
+            self.geometry.root, areas, options.stiffness, options.width, from_wall
+        )
+        wedge = SignedDistancePenalty(
+            self.wedges.wedge(self.index, 0.0),
+            areas,
+            scene.contact.stiffness,
+            scene.contact.width,
+            from_wedge,
+        )
+        return wall, wedge
+
+    def _self_contact(self, membrane: float) -> SelfContact:
+        options = self.scene.solver
+        distance = options.barrier_distance
+        if distance is None:
+            distance = min(0.3 * self.cusp.thickness, 0.2 * self.scene.mesh_size)
+        stiffness = options.barrier_stiffness * membrane / distance**2
+        return SelfContact(self.start, self.mesh.triangles, distance, stiffness)
+
+    def _solver(self, unit: float) -> None:
+        """``unit`` is the membrane's stiffness E H / R^2 [kPa/mm], which scales all damping."""
+        settings = NewtonSettings(
+            maximum_iterations=self.scene.solver.maximum_iterations,
+            largest_move=self.geometry.commissures.circumradius / 6,
+            first_shift=0.03 * unit,
+            largest_shift=1e7 * unit,
+        )
+        self.newton = NewtonSolver(self.system, settings)
+        self.relaxation = Relaxation(self.system, self.newton, RelaxationSettings(unit))

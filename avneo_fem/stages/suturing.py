@@ -1,0 +1,296 @@
+"""All stages of one cusp, from the flat template to its place in the root.
+
+Order and reasons (design.md §3): bending is on from the first step and the state never crosses
+itself. ``boundary`` moves the sutured edge to its line in damped steps; ``hinged_edge`` takes the
+damping out (paper §3.2 step 3); ``clamped_edge`` turns the edge into its tangent half-plane (step
+4); ``contact_wedge`` closes the wedge, lambda = 0 ... 1, with the wall already present (§3.4 step
+2); ``root_wall`` raises eta_1 of wall and wedge until the cusp keeps its clearances (step 3);
+``equilibrium`` converges the result.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
+from avneo_fem.equilibrium.directors import clamp_rotation, renew_directors, start_directors
+from avneo_fem.meshing.harmonic import harmonic_extension
+from avneo_fem.stages.checkpoint import Checkpoint, CheckpointStore
+from avneo_fem.stages.continuation import StageFailed, march
+from avneo_fem.stages.cusp_setup import CuspSetup
+from avneo_fem.stages.record import CuspResult, Snapshot, StageRecord
+
+__all__ = ["CuspSuturing"]
+
+Floats = NDArray[np.float64]
+Outcome = tuple[Floats | None, str]
+
+#: share of the pressure that acts while the edge leaves the template
+_FIRST_PRESSURE = 0.05
+#: first dampings, in units of E H / R^2
+_BOUNDARY_DAMPING, _SETTLE_DAMPING = 1.5, 0.6
+_BOUNDARY_ITERATIONS = 6
+_BOUNDARY_LEVELS = 10
+
+
+class CuspSuturing:
+    """Runs the stages of one cusp.
+
+    Parameters
+    ----------
+    setup : CuspSetup
+        Model, constraints and solver.
+    observer : callable
+        Told the cusp's index and every completed level.
+    store : CheckpointStore or None
+        Where progress is kept.
+    """
+
+    def __init__(
+        self,
+        setup: CuspSetup,
+        observer: Callable[[int, StageRecord], None],
+        store: CheckpointStore | None = None,
+    ) -> None:
+        self.setup, self.observer, self.store = setup, observer, store
+        self.options = setup.scene.solver
+        self.records: list[StageRecord] = []
+        self.snapshots: list[Snapshot] = []
+
+    def run(self, resume: bool = False) -> CuspResult:
+        """Run all stages; a failure is part of the result, with the last good state."""
+        clock, setup, failure = time.perf_counter(), self.setup, None
+        state, done = self._begin(resume)
+        try:
+            for number, (name, before, after) in enumerate(self._levels()):
+                self._activate(name, after)
+                if number >= done:
+                    state = self._level(state, name, before, after, number + 1)
+            state = self._raise_until_inside(state)
+        except StageFailed as error:
+            state, failure = error.state, str(error)
+        return CuspResult(
+            index=setup.index,
+            mesh=setup.mesh,
+            points=setup.system.positions(state),
+            records=self.records,
+            snapshots=self.snapshots,
+            residual=setup.system.relative_residual(state),
+            dofs=setup.model.size,
+            failure=failure,
+            compile_seconds=setup.compile_seconds,
+            seconds=time.perf_counter() - clock,
+        )
+
+    def _begin(self, resume: bool) -> tuple[Floats, int]:
+        """First state, or that of the checkpoint, and the number of levels it has behind it."""
+        setup, model = self.setup, self.setup.model
+        away = setup.target - setup.start[setup.mesh.suture_line]
+        self._way = harmonic_extension(setup.mesh, away)
+        state = np.zeros(model.size)
+        state[model.position_dofs] = setup.start
+        state = start_directors(model, state)
+        checkpoint = self.store.load(setup.index) if resume and self.store else None
+        if checkpoint is None:
+            return state, 0
+        self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
+        setup.wall.stiffness, setup.wedge.stiffness = checkpoint.penalty_stiffness
+        if model.parameters.bending:
+            model.set_directors(checkpoint.directors)
+        return checkpoint.state, checkpoint.levels_done
+
+    # -- levels ----------------------------------------------------------------------------
+    def _levels(self) -> list[tuple[str, float, float]]:
+        """(stage, parameter before, parameter after) of all levels known beforehand."""
+        scene = self.setup.scene
+        levels = [("placement", 0.0, float(self.setup.placement_k))]
+        count = _BOUNDARY_LEVELS
+        levels += [("boundary", k / count, (k + 1) / count) for k in range(count)]
+        levels += [("hinged_edge", 0.0, 1.0)]
+        if scene.material.bending:
+            count = scene.solver.clamp_steps
+            levels += [("clamped_edge", k / count, (k + 1) / count) for k in range(count)]
+        count = scene.contact.steps
+        # lambda = 0 is a level of its own: there wedge and wall appear
+        levels += [("contact_wedge", (k - 1) / count, k / count) for k in range(count + 1)]
+        return levels
+
+    def _activate(self, name: str, parameter: float) -> None:
+        """Terms and held angles that come with a level; they stay for all later ones."""
+        setup = self.setup
+        if name == "clamped_edge":
+            setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
+        elif name == "contact_wedge":
+            setup.system.terms = [setup.wedge, setup.wall]
+            setup.wedge.field = setup.wedges.wedge(setup.index, parameter)
+        if name != "boundary":
+            setup.model.pressure = setup.scene.diastolic_pressure
+
+    def _level(self, state: Floats, name: str, before: float, after: float, done: int) -> Floats:
+        """Run one level and keep its verdict, also when it fails."""
+        attempt, step, reason = {
+            "placement": (None, 1.0, "placed clear of the suture line"),
+            "boundary": (
+                self._move_boundary,
+                1.0 / self.options.boundary_steps,
+                "damped steps accepted, free of crossings",
+            ),
+            "hinged_edge": (self._settle_hinged, 1.0, ""),
+            "clamped_edge": (self._turn_edge, after - before, ""),
+            "contact_wedge": (self._close_wedge, after - before, ""),
+        }[name]
+        clock, used = time.perf_counter(), self.setup.newton.iterations
+        failure, steps = None, 1
+        if attempt is not None:
+            smallest = self.options.smallest_step * step
+            try:
+                state, steps = march(state, before, after, attempt, step, smallest, name)
+                reason = reason or "converged: residual below tolerance"
+            except StageFailed as error:
+                failure, state = error, error.state
+                reason, after, steps, done = str(error), error.parameter, error.steps, done - 1
+        self._keep(state, name, after, used, reason, clock, steps, done)
+        if failure is not None:
+            raise failure
+        return state
+
+    def _keep(
+        self,
+        state: Floats,
+        name: str,
+        parameter: float,
+        used: int,
+        reason: str,
+        clock: float,
+        steps: int,
+        done: int,
+    ) -> None:
+        """Record, snapshot and checkpoint of a level."""
+        setup = self.setup
+        residual = setup.system.relative_residual(state)
+        spent = setup.newton.iterations - used
+        seconds = time.perf_counter() - clock
+        record = StageRecord(name, parameter, spent, reason, residual, seconds, steps)
+        points = setup.system.positions(state)
+        self.records.append(record)
+        self.snapshots.append(Snapshot(name, parameter, points, self._fields(points)))
+        self.observer(setup.index, record)
+        if self.store is not None:
+            directors = setup.model.directors
+            stiffness = (setup.wall.stiffness, setup.wedge.stiffness)
+            kept = Checkpoint(state, directors, done, stiffness, self.records, self.snapshots)
+            self.store.save(setup.index, kept)
+
+    def _fields(self, points: Floats) -> dict[str, Floats]:
+        """Distances and penalty pressure at the nodes, for ParaView."""
+        setup = self.setup
+        pressure = np.zeros(len(points))
+        for term in setup.system.terms:
+            if isinstance(term, SignedDistancePenalty):
+                pressure += term.stiffness * term.ramp(points)
+        return {
+            "wall_distance": setup.geometry.root.signed_distance(points),
+            "wedge_distance": setup.wedge.field.evaluate(points)[0],
+            "penalty_pressure": pressure,
+        }
+
+    # -- attempts of one step --------------------------------------------------------------
+    def _settle(self, state: Floats) -> Outcome:
+        tolerance, budget = self.options.path_tolerance, self.options.maximum_iterations
+        settled, verdict = self.setup.relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
+        return (settled if verdict.converged else None), (
+            f"{verdict.reason}, residual {verdict.residual:.1e}"
+        )
+
+    def _move_boundary(self, state: Floats, start: float, stop: float) -> Outcome:
+        """Move the sutured edge on its straight way; the inside follows harmonically."""
+        setup, model = self.setup, self.setup.model
+        move = (stop - start) * self._way
+        clear = setup.contact.step_fraction(setup.system.positions(state), move)
+        if clear < 1.0:
+            return None, f"layers would collide after {clear:.2f} of the step"
+        trial = state.copy()
+        trial[model.position_dofs] += move
+        line = setup.mesh.suture_line
+        trial[model.position_dofs[line]] = setup.start[line] + stop * (
+            setup.target - setup.start[line]
+        )
+        model.pressure = setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, stop)
+        return self._damped(trial)
+
+    def _damped(self, trial: Floats) -> Outcome:
+        state, verdict = self.setup.relaxation.damped(trial, _BOUNDARY_DAMPING, _BOUNDARY_ITERATIONS)
+        return (state if np.isfinite(verdict.residual) else None), verdict.reason
+
+    def _settle_hinged(self, state: Floats, _start: float, _stop: float) -> Outcome:
+        return self._settle(state)
+
+    def _turn_edge(self, state: Floats, start: float, stop: float) -> Outcome:
+        """Turn the suture edges by their share of what is missing to the tangent half-plane."""
+        setup, model = self.setup, self.setup.model
+        state = renew_directors(model, state)
+        rest = clamp_rotation(model, state, setup.conormal)
+        trial = state.copy()
+        trial[model.angle_dofs[setup.mesh.suture_edges]] += (stop - start) / (1.0 - start) * rest
+        return self._settle(trial)
+
+    def _close_wedge(self, state: Floats, _start: float, stop: float) -> Outcome:
+        self.setup.wedge.field = self.setup.wedges.wedge(self.setup.index, max(stop, 0.0))
+        return self._settle(state)
+
+    # -- last stages -----------------------------------------------------------------------
+    def shortfalls(self, points: Floats) -> tuple[float, float]:
+        """Largest miss of the clearances from wall and wedge, sutured nodes apart [mm]."""
+        free = np.ones(len(points), dtype=bool)
+        free[self.setup.mesh.suture_line] = False
+        terms = (self.setup.wall, self.setup.wedge)
+        wall, wedge = (float(term.shortfall(points)[free].max()) for term in terms)
+        return wall, wedge
+
+    def _raise_until_inside(self, state: Floats) -> Floats:
+        """Raise eta_1 of wall and wedge until the clearances hold, then converge (§3.4 step 3)."""
+        setup, scene = self.setup, self.setup.scene
+        limits = (scene.wall.maximum_stiffness, scene.contact.maximum_stiffness)
+        while True:
+            misses = self.shortfalls(setup.system.positions(state))
+            late = [miss > self.options.inside_tolerance for miss in misses]
+            if not any(late):
+                state = self._converge(state, "equilibrium", self.options.tolerance)
+                misses = self.shortfalls(setup.system.positions(state))
+                if max(misses) <= self.options.inside_tolerance:
+                    return state
+                continue
+            raised = False
+            for term, limit, behind in zip((setup.wall, setup.wedge), limits, late, strict=True):
+                if behind and term.stiffness < limit:
+                    term.stiffness = min(limit, scene.wall.growth * term.stiffness)
+                    raised = True
+            if not raised:
+                state = self._converge(state, "equilibrium", self.options.tolerance)
+                message = (
+                    f"root_wall: {misses[0]:.3f} mm short of the clearance from the wall and"
+                    f" {misses[1]:.3f} mm from the contact wedge at eta_1 = {setup.wall.stiffness:g}"
+                    f" and {setup.wedge.stiffness:g} kPa; raise wall.maximum_stiffness,"
+                    " contact.maximum_stiffness or solver.inside_tolerance"
+                )
+                raise StageFailed(message, state, setup.wall.stiffness, 0)
+            state = self._converge(state, "root_wall", self.options.path_tolerance)
+
+    def _converge(self, state: Floats, name: str, tolerance: float) -> Floats:
+        clock, used = time.perf_counter(), self.setup.newton.iterations
+        budget = 10 * self.options.maximum_iterations
+        relaxation = self.setup.relaxation
+        state, verdict = relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
+        stiffness = self.setup.wall.stiffness
+        self._keep(state, name, stiffness, used, verdict.reason, clock, 1, len(self._levels()))
+        if not verdict.converged:
+            message = (
+                f"{name}: residual {verdict.residual:.1e} of the pressure load, wanted"
+                f" {tolerance:.1e} ({verdict.reason}); raise solver.maximum_iterations"
+            )
+            raise StageFailed(message, state, stiffness, 0)
+        return state

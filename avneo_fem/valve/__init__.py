@@ -1,0 +1,1 @@
+"""Three cusps: which are congruent, which process solves which, and all of them together."""

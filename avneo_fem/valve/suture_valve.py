@@ -1,0 +1,110 @@
+"""Suture all cusps of a scene, shared out over the MPI ranks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from avneo_fem.compat import MPI, clear_stale_kernels
+from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.valve_geometry import ValveGeometry
+from avneo_fem.meshing.cusp_mesh import CuspMesh
+from avneo_fem.meshing.triangulate import triangulate_template
+from avneo_fem.scene import Scene
+from avneo_fem.stages.checkpoint import CheckpointStore
+from avneo_fem.stages.cusp_setup import CuspSetup
+from avneo_fem.stages.record import CuspResult, StageRecord
+from avneo_fem.stages.suturing import CuspSuturing
+from avneo_fem.valve.congruence import representatives, rotate_result
+
+__all__ = ["ValveInput", "suture_valve"]
+
+
+@dataclass(frozen=True)
+class ValveInput:
+    """A scene with the geometry that follows from it."""
+
+    scene: Scene
+    geometry: ValveGeometry
+    wedges: ContactWedgeFamily
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> ValveInput:
+        """Build and check the geometry.
+
+        Raises
+        ------
+        SceneError
+            When the scene is geometrically impossible.
+        """
+        geometry = ValveGeometry.from_scene(scene)
+        wedges = ContactWedgeFamily(
+            geometry.commissures.points,
+            geometry.triple_contact.point,
+            geometry.commissures.normal,
+            geometry.contact_lengths,
+            scene.contact.omega,
+        )
+        return cls(scene, geometry, wedges)
+
+
+def suture_valve(
+    given: ValveInput,
+    observer: Callable[[int, StageRecord], None] = lambda _index, _record: None,
+    store: CheckpointStore | None = None,
+    resume: bool = False,
+    only: int | None = None,
+    comm: Any = MPI.COMM_WORLD,
+) -> list[CuspResult]:
+    """Run the stages of every cusp.
+
+    Congruent cusps are solved once and turned (``scene.reuse_congruent``), unless there are as
+    many ranks as cusps: then nothing is saved by it and every rank takes one.
+
+    Parameters
+    ----------
+    given : ValveInput
+        Scene and geometry, the same on all ranks.
+    observer : callable
+        Told the cusp's index and every completed level, on the rank that solves it.
+    store, resume
+        Where progress is kept, and whether to go on from there.
+    only : int or None
+        Just this cusp.
+    comm : MPI communicator
+        Cusps are dealt out to its ranks.
+
+    Returns
+    -------
+    list of CuspResult
+        In the order of the cusps; empty on all ranks but the first.
+    """
+    scene = given.scene
+    if comm.rank == 0:
+        clear_stale_kernels()
+    comm.Barrier()
+    wanted = [0, 1, 2] if only is None else [only]
+    same = tuple(wanted)
+    if only is None and scene.reuse_congruent and comm.size < len(wanted):
+        same = representatives(scene, given.geometry, given.wedges)
+    to_solve = sorted(set(same))
+    meshes: dict[Any, CuspMesh] = {}
+    mine = []
+    for number, index in enumerate(to_solve):
+        if number % comm.size != comm.rank:
+            continue
+        template = scene.cusp[index].template
+        if template not in meshes:
+            cusp = given.geometry.cusps[index]
+            meshes[template] = triangulate_template(cusp.template, scene.mesh_size)
+        setup = CuspSetup(scene, given.geometry, given.wedges, index, meshes[template])
+        mine.append(CuspSuturing(setup, observer, store).run(resume))
+    gathered = comm.gather(mine, root=0)
+    if comm.rank != 0:
+        return []
+    solved = {result.index: result for part in gathered for result in part}
+    return [
+        solved[source] if source == index else rotate_result(given.geometry, solved[source], index)
+        for index, source in zip(wanted, same, strict=True)
+    ]
