@@ -207,7 +207,7 @@ class Solver(_Table):
         1.0 / 256.0, description="a nominal step may be divided down to this share of itself"
     )
     maximum_iterations: Annotated[int, Field(ge=1)] = Field(
-        60, description="Newton iterations in one solve"
+        400, description="Newton iterations that one step of a stage may spend"
     )
     barrier_distance: Positive | None = Field(
         None, description="self-contact acts below it [mm]; default min(0.3 H, 0.2 h)"

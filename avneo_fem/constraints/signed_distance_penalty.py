@@ -49,8 +49,18 @@ class SignedDistancePenalty:
         width: float,
         clearance: Floats,
     ) -> None:
-        self.field, self.node_areas = field, node_areas
+        self.node_areas = node_areas
+        self.field = field
         self.stiffness, self.width, self.clearance = stiffness, width, clearance
+
+    @property
+    def field(self) -> SignedDistance:
+        """The volume to stay in; may be replaced between solves."""
+        return self._field
+
+    @field.setter
+    def field(self, field: SignedDistance) -> None:
+        self._field = field
         self._seen: Floats | None = None
         self._value: tuple[Floats, Floats, Floats] = (np.empty(0),) * 3
 

@@ -38,6 +38,7 @@ class RelaxationSettings:
     smallest: float = 3e-3
     largest: float = 15.0
     undamped_below: float = 1e-4
+    largest_stalls: int = 12
 
 
 class Relaxation:
@@ -83,14 +84,20 @@ class Relaxation:
             The last state and how it ended; ``residual`` is the undamped one.
         """
         clock, settings = time.perf_counter(), self.settings
-        system, used = self.system, 0
+        system, used, stalls = self.system, 0, 0
         reason = "converged: residual below tolerance"
         while True:
             state = renew_directors(system.model, state)
             residual = system.relative_residual(state)
             if residual <= tolerance:
                 break
-            if used >= budget or not np.isfinite(residual):
+            if not np.isfinite(residual):
+                reason = "residual is not a number"
+                break
+            if stalls > settings.largest_stalls:
+                reason = "no step decreases the energy, whatever the damping"
+                break
+            if used >= budget:
                 reason = f"iteration limit of {budget} reached"
                 break
             if residual < settings.undamped_below:
@@ -104,6 +111,7 @@ class Relaxation:
                 target, extra, limit = tolerance, [], 2 * settings.inner_iterations
             state, verdict = self.newton.solve(state, target, extra, min(limit, budget - used))
             used += max(verdict.iterations, 1)
+            stalls = 0 if verdict.iterations or verdict.converged else stalls + 1
             if verdict.converged:
                 damping /= settings.decrease
             else:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from avneo_fem import compat
-from avneo_fem.compat import PETSc, fem, fem_petsc, ufl
+from avneo_fem.compat import fem, fem_petsc, ufl
 from avneo_fem.mechanics.bending import bending_energy_density
 from avneo_fem.mechanics.loads import (
     free_edge_energy_density,
@@ -27,6 +27,20 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _FREE_EDGE = 1
+
+#: Entries of the one constant vector in the kernels
+_CONSTANTS: dict[str, int | slice] = {
+    "young_modulus": 0,
+    "thickness": 1,
+    "pressure": 2,
+    "free_edge_load": 3,
+    "free_edge_width": 4,
+    "free_edge_clearance": 5,
+    "template_level": 6,
+    "plane_point": slice(7, 10),
+    "plane_normal": slice(10, 13),
+}
+_NUMBER_OF_CONSTANTS = 13
 
 
 @dataclass(frozen=True)
@@ -111,14 +125,13 @@ class ShellModel:
     def _compile(self) -> None:
         p, domain = self.parameters, self.domain
         self._state, self._base = fem.Function(self.space), fem.Function(self.space)
-        names = ("young_modulus", "thickness", "pressure", "free_edge_width")
-        self._constants = {name: self._constant(getattr(p, name)) for name in names}
-        c = self._constants
-        c["free_edge_load"] = self._constant(0.0)
-        c["free_edge_clearance"] = self._constant(p.free_edge_clearance)
-        c["template_level"] = self._constant(p.template_level)
-        c["plane_point"] = self._constant(p.plane_point)
-        c["plane_normal"] = self._constant(p.plane_normal)
+        # one constant with all numbers: UFL orders several by the text of their serial numbers
+        # ("10" < "9"), so that the same form would now and then be compiled again
+        self._constants = fem.Constant(domain, np.zeros(_NUMBER_OF_CONSTANTS))
+        c = {name: _part(self._constants, place) for name, place in _CONSTANTS.items()}
+        for name in _CONSTANTS:
+            if name != "free_edge_load":
+                self._set(name, getattr(p, name))
         position, angle = self._split(self._state)
         start, _ = self._split(self._base)
         gradient = ufl.grad(position)
@@ -163,8 +176,8 @@ class ShellModel:
         space = compat.function_space(self.domain, element)
         return fem.Function(space), compat.match_points(space.tabulate_dof_coordinates(), midpoints)
 
-    def _constant(self, value: Any) -> Any:
-        return fem.Constant(self.domain, np.asarray(value, dtype=PETSc.ScalarType))
+    def _set(self, name: str, value: Any) -> None:
+        self._constants.value[_CONSTANTS[name]] = value
 
     def _split(self, function: Any) -> tuple[Any, Any]:
         return ufl.split(function) if self.parameters.bending else (function, None)
@@ -173,11 +186,11 @@ class ShellModel:
     @property
     def pressure(self) -> float:
         """P [kPa]; may be set between solves."""
-        return float(self._constants["pressure"].value)
+        return float(self._constants.value[_CONSTANTS["pressure"]])
 
     @pressure.setter
     def pressure(self, value: float) -> None:
-        self._constants["pressure"].value = value
+        self._set("pressure", value)
 
     @property
     def free_edge_stiffness(self) -> float:
@@ -189,7 +202,7 @@ class ShellModel:
         self._free_edge_stiffness = value
         along = np.diff(self.mesh.points[self.mesh.free_edge], axis=0)
         length = np.linalg.norm(along, axis=1).sum()
-        self._constants["free_edge_load"].value = value * self.mesh.area / length
+        self._set("free_edge_load", value * self.mesh.area / length)
 
     def set_directors(self, directors: Floats) -> None:
         """Reference directors p_e, (e, 3) unit vectors in the order of ``mesh.edges``."""
@@ -233,3 +246,10 @@ class ShellModel:
         self._matrix.assemble()
         rows, columns, values = self._matrix.getValuesCSR()
         return sp.csr_matrix((values, columns, rows), shape=(self.size, self.size))
+
+
+def _part(vector: Any, place: int | slice) -> Any:
+    """One entry of a UFL vector, or several as a vector."""
+    if isinstance(place, int):
+        return vector[place]
+    return ufl.as_vector([vector[row] for row in range(place.start, place.stop)])

@@ -19,7 +19,7 @@ from avneo_fem.results.writing import written_whole
 from avneo_fem.scene import Scene
 from avneo_fem.stages.record import CuspResult
 
-__all__ = ["build_report", "geometry_report", "write_report"]
+__all__ = ["build_report", "geometry_report", "to_json", "write_report"]
 
 
 def geometry_report(
@@ -110,9 +110,12 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def write_report(path: Path, report: dict[str, Any]) -> str:
-    """Write report.json, whole or not at all; returns its text."""
-    text = json.dumps(_plain(report), indent=2) + "\n"
+def to_json(report: dict[str, Any]) -> str:
+    """Report as JSON text."""
+    return json.dumps(_plain(report), indent=2) + "\n"
+
+
+def write_report(path: Path, report: dict[str, Any]) -> None:
+    """Write report.json, whole or not at all."""
     with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return text
+        temporary.write_text(to_json(report), encoding="utf-8")

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from avneo_fem.errors import SceneError
 from avneo_fem.results.writing import written_whole
 
-__all__ = ["write_stl"]
+__all__ = ["read_stl", "write_stl"]
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -53,3 +54,24 @@ def write_stl(path: str | Path, points: ArrayLike, triangles: ArrayLike, name: s
     header = f"binary STL, mm; {name}".encode("ascii", "replace")[:80].ljust(80)
     with written_whole(path) as temporary:
         temporary.write_bytes(header + np.array(len(corners), "<u4").tobytes() + records.tobytes())
+
+
+def read_stl(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points (n, 3) and triangles (m, 3) of a binary STL file; equal corners become one point.
+
+    Raises
+    ------
+    SceneError
+        When the file is missing or no binary STL.
+    """
+    try:
+        data = Path(path).read_bytes()
+        count = int.from_bytes(data[80:84], "little")
+        records = np.frombuffer(data, dtype=_RECORD, offset=84)
+        if len(records) != count:
+            raise ValueError("length does not fit the number of triangles")
+    except (OSError, ValueError) as error:
+        raise SceneError("surface file", str(path), f"cannot be read ({error})") from None
+    corners = records["corners"].reshape(-1, 3)
+    points, inverse = np.unique(corners, axis=0, return_inverse=True)
+    return points.astype(np.float64), inverse.reshape(-1, 3).astype(np.int64)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from avneo_fem.compat import MPI, clear_stale_kernels
-from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
-from avneo_fem.geometry.valve_geometry import ValveGeometry
+from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.scene import Scene
@@ -18,35 +16,7 @@ from avneo_fem.stages.record import CuspResult, StageRecord
 from avneo_fem.stages.suturing import CuspSuturing
 from avneo_fem.valve.congruence import representatives, rotate_result
 
-__all__ = ["ValveInput", "suture_valve"]
-
-
-@dataclass(frozen=True)
-class ValveInput:
-    """A scene with the geometry that follows from it."""
-
-    scene: Scene
-    geometry: ValveGeometry
-    wedges: ContactWedgeFamily
-
-    @classmethod
-    def from_scene(cls, scene: Scene) -> ValveInput:
-        """Build and check the geometry.
-
-        Raises
-        ------
-        SceneError
-            When the scene is geometrically impossible.
-        """
-        geometry = ValveGeometry.from_scene(scene)
-        wedges = ContactWedgeFamily(
-            geometry.commissures.points,
-            geometry.triple_contact.point,
-            geometry.commissures.normal,
-            geometry.contact_lengths,
-            scene.contact.omega,
-        )
-        return cls(scene, geometry, wedges)
+__all__ = ["suture_valve"]
 
 
 def suture_valve(

@@ -1,0 +1,162 @@
+"""The command line: results in files, people on stderr, ``--json`` on stdout.
+
+Exit status 0: verified; 1: a failed solve or verification, with what was reached kept; 2: bad
+input.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from avneo_fem.errors import AvneoError, SceneError
+from avneo_fem.scene import FIDELITIES, load_scene
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Virtual suturing for aortic valve neocuspidization (lengths mm, stresses kPa).",
+)
+_people = Console(stderr=True, soft_wrap=True, highlight=False)
+
+Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)")]
+Fidelity = Annotated[str | None, typer.Option(help=f"one of {', '.join(FIDELITIES)}")]
+Json = Annotated[bool, typer.Option("--json", help="print the report on stdout")]
+
+
+def _table(geometry: dict[str, Any]) -> Table:
+    """Geometry of the three cusps as a table for people."""
+    table = Table(title="geometry", title_justify="left")
+    for head in ("", "cusp 0", "cusp 1", "cusp 2"):
+        table.add_column(head, justify="left" if not head else "right")
+    for label, key, digits in (
+        ("chord a_i [mm]", "chord_lengths", 3),
+        ("length l_i [mm]", "commissure_lengths", 3),
+        ("contact c_i [mm]", "contact_lengths", 3),
+        ("aortic suture line l_a [mm]", "asl_length", 3),
+        ("cusp suture line l_c [mm]", "csl_length", 3),
+        ("stitching ratio J_sl", "stitching_ratio", 4),
+        ("sigma*", "sigma", 4),
+    ):
+        table.add_row(escape(label), *(f"{value:.{digits}f}" for value in geometry[key]))
+    return table
+
+
+def _show_geometry(geometry: dict[str, Any]) -> None:
+    _people.print(_table(geometry))
+    point = ", ".join(f"{x:.4f}" for x in geometry["triple_contact_point"])
+    case, nu = geometry["triple_point_case"], geometry["nu_star"]
+    _people.print(f"triple contact point ({point}) mm, {case}; nu* = {nu:.4f}")
+    verdict = "[green]competent[/]" if geometry["competent"] else "[yellow]not competent[/]"
+    _people.print(f"{verdict}: {escape(geometry['competence_reason'])}")
+
+
+@app.command()
+def check(scene: Scene, fidelity: Fidelity = None, json: Json = False) -> None:
+    """Geometry and competence of a scene, without solving anything."""
+    from avneo_fem.geometry.valve_input import ValveInput
+    from avneo_fem.results.report import geometry_report, to_json
+
+    given = ValveInput.from_scene(load_scene(scene, fidelity))
+    geometry = geometry_report(given.geometry, given.wedges)
+    _show_geometry(geometry)
+    if json:
+        sys.stdout.write(to_json(geometry))
+
+
+def _observer(rank: int) -> Any:
+    def tell(index: int, record: Any) -> None:
+        _people.print(
+            f"cusp {index}  {record.name:<13} {record.parameter:<9.4g}"
+            f" {record.iterations:>4} it  residual {record.residual:.1e}"
+            f"  {record.seconds:6.1f} s" + (f"  [rank {rank}]" if rank else "")
+        )
+
+    return tell
+
+
+@app.command()
+def suture(
+    scene: Scene,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: out/NAME")
+    ] = None,
+    fidelity: Fidelity = None,
+    cusp: Annotated[int | None, typer.Option(min=0, max=2, help="this cusp only")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="go on after a killed run")] = False,
+    json: Json = False,
+) -> None:
+    """Suture the cusps of a scene and write the results to DIR."""
+    from avneo_fem.geometry.valve_input import ValveInput
+
+    loaded = load_scene(scene, fidelity)
+    given = ValveInput.from_scene(loaded)
+    if not given.geometry.competent:
+        _people.print(f"[yellow]not competent:[/] {escape(given.geometry.competence_reason)}")
+    from avneo_fem.compat import MPI, install_abort_on_error
+    from avneo_fem.results.report import to_json
+    from avneo_fem.run import run_scene
+
+    install_abort_on_error()
+    rank = MPI.COMM_WORLD.rank
+    folder = Path("out") / loaded.name if output is None else output
+    report = run_scene(
+        given,
+        folder,
+        resume=resume,
+        only=cusp,
+        observer=_observer(rank),
+        warn=lambda text: _people.print(f"[yellow]{escape(text)}[/]"),
+    )
+    if rank == 0:
+        if json:
+            sys.stdout.write(to_json(report))
+        for failure in report["failures"]:
+            _people.print(f"[red]not verified:[/] {escape(failure)}")
+        seconds = report["timing"]["total_s"]
+        if report["verified"]:
+            _people.print(f"[green]verified[/] in {seconds:.0f} s: {escape(str(folder))}")
+        else:
+            _people.print(f"[red]not verified[/] after {seconds:.0f} s: {escape(str(folder))}")
+    if not report["verified"]:
+        raise typer.Exit(1)
+
+
+@app.command()
+def plot(folder: Annotated[Path, typer.Argument(metavar="DIR", help="results of a run")]) -> None:
+    """Draw valve.png of a results folder again."""
+    import json as json_module
+
+    from avneo_fem.geometry.valve_input import ValveInput
+    from avneo_fem.results.surfaces import read_stl
+    from avneo_fem.run import draw_results
+    from avneo_fem.scene import parse_scene
+
+    try:
+        report = json_module.loads((folder / "report.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SceneError("DIR", str(folder), f"holds no readable report.json ({error})") from None
+    given = ValveInput.from_scene(parse_scene(report["scene"]))
+    surfaces = [read_stl(folder / f"cusp_{cusp['index']}.stl") for cusp in report["cusps"]]
+    draw_results(given, folder / "valve.png", surfaces)
+
+
+def main() -> None:
+    """Run the command line; every foreseen error is one line."""
+    try:
+        app(standalone_mode=True)
+    except AvneoError as error:
+        _people.print(f"[bold red]avneo:[/] {escape(str(error))}")
+        sys.exit(error.exit_status)
+    except KeyboardInterrupt:
+        _people.print("[bold red]avneo:[/] interrupted; --resume goes on from the last level")
+        sys.exit(130)
