@@ -162,3 +162,17 @@ def evaluated(expression: Any) -> Floats:
 def merit(model: ShellModel, base: Floats) -> Callable[[Floats], float]:
     """Energy less the work of the pressure since ``base``; potential of the residual at base."""
     return lambda state: model.energy(state) - model.pressure_work(state, base)
+
+
+def hairpin(mesh: CuspMesh, gap: float) -> Floats:
+    """(n, 3) a strip along x folded without stretch about its middle into two layers ``gap`` apart.
+
+    The lower layer lies in z = 0, its fold is half a circle.
+    """
+    x, y = mesh.points.T
+    radius, middle = gap / 2, x.max() / 2
+    start = middle - np.pi * radius / 2
+    angle = np.clip((x - start) / radius, 0, np.pi)
+    beyond = np.maximum(x - start - np.pi * radius, 0)
+    along = np.minimum(x, start) + radius * np.sin(angle) - beyond
+    return np.c_[along, y, radius * (1 - np.cos(angle))]

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ellipe, ellipeinc
 
-from avneo_fem.geometry.curve import Arc, Bezier, Line, PlanarPath
+from avneo_fem.geometry.curve import PlanarPath
+from avneo_fem.geometry.segments import Arc, Bezier, Line
 
 QUARTIC = Bezier(((0.0, 0.0), (1.0, -2.0), (4.0, -3.0), (6.0, 1.0), (5.0, 4.0)))
 

@@ -4,61 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from valve_cases import DEMOS, build, experiment
 
 from avneo_fem.errors import SceneError
-from avneo_fem.geometry.commissure import quasi_optimal_lengths
-from avneo_fem.geometry.valve_geometry import ValveGeometry
-from avneo_fem.scene import load_scene, parse_scene
+from avneo_fem.scene import load_scene
 
-DEMOS = Path(__file__).parents[1] / "demos"
-
-GAMMA = (1.5, 1.0, 1.25)
-SCENES: dict[int, dict[str, Any]] = {
-    1: {},
-    2: {
-        "commissures": {"chord_ratio": [8.0, 9.0, 6.0]},
-        "suture_line": {"type": "B"},
-        "cusp": [
-            {"template": {"free_edge_length": 39.0 * g, "belly_radius": 16.5 * g}} for g in GAMMA
-        ],
-    },
-}
 TABLE: dict[int, tuple[list[float], list[float], float]] = {
     1: ([0.5315] * 3, [19.5] * 3, 0.6153),
     2: ([0.3963, 0.6203, 0.3824], [14.625, 34.125, 24.375], 0.6031),
     3: ([0.8062, 0.7152, 0.7206], [6.872, 16.036, 11.454], 0.9859),
 }
-
-
-def build(data: dict[str, Any]) -> ValveGeometry:
-    """Geometry of a scene given as nested dictionaries."""
-    return ValveGeometry.from_scene(parse_scene(data))
-
-
-def quasi_optimal(scale: float = 1.0) -> dict[str, Any]:
-    """Experiment 3, or the same with all L_f scaled."""
-    ratio = {"chord_ratio": [6.0, 4.0, 5.0]}
-    sizes = [{"template": {"free_edge_length": x, "belly_radius": 9.0}} for x in (27.0, 20.0, 23.0)]
-    lengths = scale * quasi_optimal_lengths(
-        build({"commissures": ratio, "cusp": sizes}).commissures.chord_lengths
-    )
-    cusps = [
-        {"template": {"free_edge_length": float(x), "belly_radius": float(11.0 * x / 26.0)}}
-        for x in lengths
-    ]
-    return {"commissures": ratio, "cusp": cusps}
-
-
-def experiment(number: int, source: str) -> ValveGeometry:
-    """One of the paper's runs, from code or from its demo."""
-    if source == "demo":
-        return ValveGeometry.from_scene(load_scene(DEMOS / f"experiment_{number}.toml"))
-    return build(SCENES[number] if number in SCENES else quasi_optimal())
 
 
 @pytest.mark.parametrize("source", ["code", "demo"])
@@ -138,57 +97,6 @@ def test_equal_cusps_are_rotations() -> None:
         expected[:, :2] = expected[:, :2] @ turn.T
         assert np.abs(cusp.sutured_position(s) - expected).max() < 1e-12
     assert np.abs(valve.triple_contact.point).max() < 1e-12
-
-
-def test_competent_and_not() -> None:
-    """Truth: Experiments 1 and 3 are competent, 2 falls in case 1 on A_0A_2 (design.md)."""
-    assert experiment(1, "code").competent
-    assert experiment(3, "code").competent
-    valve = experiment(2, "code")
-    assert not valve.competent
-    assert (valve.triple_contact.case, valve.triple_contact.edge_index) == ("edge", 1)
-    assert "A_0A_2" in valve.competence_reason
-    assert "0.6031" in valve.competence_reason
-
-
-def test_advice_for_case_1_works() -> None:
-    """Truth: shortening cusps 0 and 2 of Experiment 2 as advised makes (3.2) solvable, not less."""
-    reason = experiment(2, "code").competence_reason
-    excess = float(reason.split("shorter by ")[1].split(" mm")[0])
-    for factor, case in ((1.001, "interior"), (0.999, "edge")):
-        lengths = np.array([58.5, 39.0, 48.75]) - factor * excess * np.array([1.0, 0.0, 1.0])
-        cusps = [
-            {"template": {"free_edge_length": float(x), "belly_radius": 16.0}} for x in lengths
-        ]
-        assert build({**SCENES[2], "cusp": cusps}).triple_contact.case == case
-
-
-@pytest.mark.parametrize(("scale", "words"), [(0.9, "too small to close"), (2.2, "too large")])
-def test_advice_for_dilation_works(scale: float, words: str) -> None:
-    """Truth: nu* out of its limits is reported; all L_f times the given factor give nu* = 1."""
-    data = quasi_optimal(scale)
-    if scale < 1.0:  # small cusps: a smaller root so that the stitching ratio stays in range
-        for cusp in data["cusp"]:
-            cusp["template"]["corner_height"] = 16.0
-    data["stitching"] = {"gather_ratio": 6.0}
-    valve = build(data)
-    assert not valve.competent
-    assert words in valve.competence_reason
-    factor = float(valve.competence_reason.split("times ")[1].split(" ")[0])
-    for cusp in data["cusp"]:
-        cusp["template"]["free_edge_length"] *= factor
-        cusp["template"]["belly_radius"] *= factor  # so that the template still exists
-    assert build(data).triple_contact.nu_star == pytest.approx(1.0, abs=1e-3)
-    wide = {"minimum_nu": 0.01, "maximum_nu": 100.0}
-    assert build({**data, "competence": wide}).competent
-
-
-def test_policy_error() -> None:
-    """Truth: with policy "error" a valve that is not competent is refused with the reason."""
-    with pytest.raises(SceneError, match="A_0A_2") as caught:
-        build({**SCENES[2], "competence": {"policy": "error"}})
-    assert caught.value.key == "competence.policy"
-    assert build({"competence": {"policy": "error"}}).competent
 
 
 @pytest.mark.parametrize(

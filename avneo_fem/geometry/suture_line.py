@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from avneo_fem import scene
 from avneo_fem.errors import SceneError
-from avneo_fem.geometry.curve import Arc, Bezier, Line, PlanarPath, Segment
+from avneo_fem.geometry.curve import PlanarPath
+from avneo_fem.geometry.segments import Arc, Bezier, Line, Segment
 
 __all__ = ["AorticSutureLine"]
 

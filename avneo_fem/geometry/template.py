@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from avneo_fem import scene
 from avneo_fem.errors import SceneError
-from avneo_fem.geometry.curve import Arc, Line, PlanarPath
+from avneo_fem.geometry.curve import PlanarPath
+from avneo_fem.geometry.segments import Arc, Line
 
 __all__ = ["CuspTemplate", "free_edge_length_for", "suture_length"]
 

@@ -10,19 +10,19 @@ from numpy.typing import ArrayLike, NDArray
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.commissure import (
     CommissurePlane,
-    TripleContactPoint,
     commissure_angles,
     commissure_directions,
     contact_lengths,
-    triple_contact_point,
 )
+from avneo_fem.geometry.competence import competence_verdict
 from avneo_fem.geometry.root import CylinderRoot
 from avneo_fem.geometry.stitching import StitchingMap
 from avneo_fem.geometry.suture_line import AorticSutureLine
 from avneo_fem.geometry.template import CuspTemplate, free_edge_length_for
-from avneo_fem.scene import Competence, Scene
+from avneo_fem.geometry.triple_contact import TripleContactPoint, triple_contact_point
+from avneo_fem.scene import Scene
 
-__all__ = ["CuspGeometry", "ValveGeometry", "competence_verdict"]
+__all__ = ["CuspGeometry", "ValveGeometry"]
 
 Array = NDArray[np.float64]
 
@@ -176,35 +176,3 @@ def _stitching(
             template.parameters.free_edge_length,
             f"cusp {index} does not fit its suture line: {error.valid}{valid}",
         ) from None
-
-
-def competence_verdict(
-    triple: TripleContactPoint, plane: CommissurePlane, contact: Array, limits: Competence
-) -> tuple[bool, str]:
-    """Verdict of paper section 3.4, step 1, and the reason in one sentence.
-
-    Scaling all free edge lengths by a factor f divides nu* by f. In case 1 the point leaves the
-    side A_j A_k when c_i comes down to |A_i K_i| / nu_i, that is when l_j and l_k both lose the
-    difference.
-    """
-    nu = triple.nu_star
-    reasons = []
-    if triple.edge_index is not None:
-        i = triple.edge_index
-        j, k = sorted({0, 1, 2} - {i})
-        excess = contact[i] - np.linalg.norm(plane.points[i] - triple.point) / nu
-        reasons.append(
-            f"(3.2) has no solution, the triple contact point lies on the side"
-            f" A_{j}A_{k}: cusp {i} is too small for cusps {j} and {k}, whose"
-            f" free_edge_length would have to be shorter by {excess:.4g} mm each"
-        )
-    if nu > limits.maximum_nu:
-        reasons.append(f"nu* = {nu:.4g} > {limits.maximum_nu:g}: the cusps are too small to close")
-    if nu < limits.minimum_nu:
-        reasons.append(f"nu* = {nu:.4g} < {limits.minimum_nu:g}: the cusps are too large")
-    if not reasons:
-        return True, (
-            f"the triple contact point lies inside the triangle of the commissures and nu* ="
-            f" {nu:.4g} within [{limits.minimum_nu:g}, {limits.maximum_nu:g}]"
-        )
-    return False, f"{'; '.join(reasons)}; all free_edge_length times {nu:.4g} give nu* = 1"
