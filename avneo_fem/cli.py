@@ -78,7 +78,7 @@ def _observer(rank: int) -> Any:
         _people.print(
             f"cusp {index}  {record.name:<13} {record.parameter:<9.4g}"
             f" {record.iterations:>4} it  residual {record.residual:.1e}"
-            f"  {record.seconds:6.1f} s" + (f"  [rank {rank}]" if rank else "")
+            f"  {record.seconds:6.1f} s" + (f"  (rank {rank})" if rank else "")
         )
 
     return tell
@@ -109,14 +109,22 @@ def suture(
     install_abort_on_error()
     rank = MPI.COMM_WORLD.rank
     folder = Path("out") / loaded.name if output is None else output
-    report = run_scene(
-        given,
-        folder,
-        resume=resume,
-        only=cusp,
-        observer=_observer(rank),
-        warn=lambda text: _people.print(f"[yellow]{escape(text)}[/]"),
-    )
+    try:
+        report = run_scene(
+            given,
+            folder,
+            resume=resume,
+            only=cusp,
+            observer=_observer(rank),
+            warn=lambda text: _people.print(f"[yellow]{escape(text)}[/]"),
+        )
+    except AvneoError as error:
+        if MPI.COMM_WORLD.size == 1:
+            raise
+        # the other ranks may be waiting for this one
+        _tell_error(error)
+        MPI.COMM_WORLD.Abort(error.exit_status)
+        raise
     if rank == 0:
         if json:
             sys.stdout.write(to_json(report))
@@ -145,9 +153,18 @@ def plot(folder: Annotated[Path, typer.Argument(metavar="DIR", help="results of 
         report = json_module.loads((folder / "report.json").read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise SceneError("DIR", str(folder), f"holds no readable report.json ({error})") from None
-    given = ValveInput.from_scene(parse_scene(report["scene"]))
-    surfaces = [read_stl(folder / f"cusp_{cusp['index']}.stl") for cusp in report["cusps"]]
+    try:
+        scene, indices = report["scene"], [int(cusp["index"]) for cusp in report["cusps"]]
+    except (KeyError, TypeError, ValueError):
+        raise SceneError("DIR", str(folder), "its report.json is not that of a run") from None
+    given = ValveInput.from_scene(parse_scene(scene))
+    surfaces = [read_stl(folder / f"cusp_{index}.stl") for index in indices]
     draw_results(given, folder / "valve.png", surfaces)
+
+
+def _tell_error(error: AvneoError) -> None:
+    _people.print(f"[bold red]avneo:[/] {escape(str(error))}")
+    sys.stderr.flush()
 
 
 def main() -> None:
@@ -155,7 +172,7 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except AvneoError as error:
-        _people.print(f"[bold red]avneo:[/] {escape(str(error))}")
+        _tell_error(error)
         sys.exit(error.exit_status)
     except KeyboardInterrupt:
         _people.print("[bold red]avneo:[/] interrupted; --resume goes on from the last level")

@@ -95,16 +95,17 @@ def clear_stale_kernels(older_than_s: float = 600.0) -> int:
 
 
 @contextmanager
-def _ffcx_leaves_files_open() -> Iterator[None]:
-    """Hide FFCx's ResourceWarnings on a cache miss; whoever makes warnings errors would fail."""
+def _known_warnings_hidden() -> Iterator[None]:
+    """Hide what FFCx and cffi warn of on a cache miss, so that warnings may be errors elsewhere."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "unclosed file .*libffcx", ResourceWarning)
+        warnings.filterwarnings("ignore", "The distutils", DeprecationWarning)
         yield
 
 
 def compile_form(form: Any) -> Any:
     """Compile a UFL form with this project's compiler flags (cached on disk by signature)."""
-    with _ffcx_leaves_files_open():
+    with _known_warnings_hidden():
         return _form(form, **{_JIT_KEYWORD: _JIT})
 
 
@@ -167,7 +168,7 @@ def scalar_element(domain: Any, family: str) -> Any:
 def function_space(domain: Any, element: Any) -> Any:
     """Function space of a UFL element."""
     make: Any = fem.functionspace if hasattr(fem, "functionspace") else fem.FunctionSpace
-    with _ffcx_leaves_files_open():
+    with _known_warnings_hidden():
         return make(domain, element, **{_JIT_KEYWORD: _JIT})
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 __all__ = ["AvneoError", "SceneError", "SolveError"]
 
+#: Values are cut after so many characters: a whole table would bury the message.
+_LONGEST_VALUE = 120
+
 
 class AvneoError(Exception):
     """Base of all errors that are reported to the user as one line."""
@@ -28,7 +31,14 @@ class SceneError(AvneoError):
 
     def __init__(self, key: str, value: object, valid: str) -> None:
         self.key, self.value, self.valid = key, value, valid
-        super().__init__(f"{key} = {value!r}: {valid}")
+        text = repr(value)
+        if len(text) > _LONGEST_VALUE:
+            text = f"{text[:_LONGEST_VALUE]}..."
+        super().__init__(f"{key} = {text}: {valid}")
+
+    def __reduce__(self) -> tuple[type[SceneError], tuple[str, object, str]]:
+        """Rebuild from the three parts: so that the error can travel between processes."""
+        return type(self), (self.key, self.value, self.valid)
 
 
 class SolveError(AvneoError):

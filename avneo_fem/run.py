@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +24,7 @@ from avneo_fem.results.verification_input import constraints_of, surface_of, tol
 from avneo_fem.results.verify import verify_valve
 from avneo_fem.stages.checkpoint import CheckpointStore
 from avneo_fem.stages.record import CuspResult, StageRecord
-from avneo_fem.valve.suture_valve import suture_valve
+from avneo_fem.valve.suture_valve import mesh_templates, suture_valve
 
 __all__ = ["draw_results", "run_scene"]
 
@@ -61,24 +62,40 @@ def run_scene(
     Raises
     ------
     SceneError
-        When ``folder`` cannot be written to.
+        When a template cannot be meshed or placed as asked, or ``folder`` cannot be written to;
+        a folder that was made for the run is then removed.
     """
     clock = time.perf_counter()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "report.json").unlink(missing_ok=True)
-    except OSError as error:
-        raise SceneError("output folder", str(folder), f"cannot be used ({error.strerror})") from None
+    meshes = mesh_templates(given)
+    is_new = not folder.exists()
+    comm.Barrier()
+    _open_folder(folder)
     store = CheckpointStore(folder / "checkpoints", given.scene, __version__)
     if not resume and comm.rank == 0:
         store.clear()
     comm.Barrier()
-    results = suture_valve(given, observer, store, resume, only, comm)
+    try:
+        results = suture_valve(given, observer, store, resume, only, comm, meshes)
+    except SceneError:
+        if is_new and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
     report = None
     if comm.rank == 0:
         report = _finish(given, folder, results, clock, comm.size, warn)
         store.clear()
     return comm.bcast(report, root=0)
+
+
+def _open_folder(folder: Path) -> None:
+    """Make the folder, make sure that it takes files, and remove the report of an older run."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+        (folder / "report.json").unlink(missing_ok=True)
+    except OSError as error:
+        reason = f"cannot be used ({error.strerror})"
+        raise SceneError("output folder", str(folder), reason) from None
 
 
 def _finish(

@@ -87,7 +87,6 @@ def test_constant_curvature_is_exact(mesh: CuspMesh, form: list) -> None:
     assert forces.max() < small**2
 
 
-
 def test_cylinder() -> None:
     """Truth: a sheet rolled on radius R, oblique to its mesh, has the energy D/2 * area / R^2;
     the error falls by 4 when the mesh size is halved."""
@@ -98,9 +97,7 @@ def test_cylinder() -> None:
         model = shell(mesh, **BENDING_ALONE)
         along, beside = mesh.points @ [c, s], mesh.points @ [-s, c]
         angle = along / radius
-        state = state_at(
-            model, np.c_[radius * np.sin(angle), beside, radius * (1 - np.cos(angle))]
-        )
+        state = state_at(model, np.c_[radius * np.sin(angle), beside, radius * (1 - np.cos(angle))])
         angle = mesh.points[mesh.edges].mean(axis=1) @ [c, s] / radius
         model.set_directors(np.c_[-np.sin(angle), 0 * angle, np.cos(angle)])
         errors.append(abs(model.energy(state) / (mesh.area / 2 / radius**2) - 1))
@@ -176,18 +173,20 @@ def test_renewing_directors_changes_nothing() -> None:
     the director that the angle is counted from)."""
     model = shell(disc(3), **BENDING_ALONE)
     state, angles = rough(model, 5), model.angle_dofs
+    aside = model.directors + 0.3 * np.random.default_rng(2).normal(size=model.directors.shape)
+    model.set_directors(aside / np.linalg.norm(aside, axis=1, keepdims=True))
     energy, moments = model.energy(state), model.residual(state)[angles]
-    assert np.abs(moments).max() > 0.01
     renewed = renew_directors(model, state)
-    assert np.abs(renewed[angles]).max() == 0
-    assert np.abs(state[angles]).max() > 0.1
+    assert np.abs(renewed[angles] - state[angles]).max() > 0.1
     assert model.energy(renewed) == pytest.approx(energy, rel=1e-10)
     np.testing.assert_allclose(model.residual(renewed)[angles], moments, atol=1e-8)
     block = model.tangent(renewed)[angles][:, angles].tocsc()
-    renewed[angles] -= spla.spsolve(block, moments)
-    forces = model.residual(renewed)
-    again = model.residual(renew_directors(model, renewed))
-    assert np.abs(renewed[angles]).max() > 0.1
+    model.set_directors(aside / np.linalg.norm(aside, axis=1, keepdims=True))
+    settled = state.copy()
+    settled[angles] -= spla.spsolve(block, moments)
+    forces = model.residual(settled)
+    again = model.residual(renew_directors(model, settled))
+    assert np.abs(forces).max() > 0.01
     np.testing.assert_allclose(again, forces, atol=1e-8)
 
 

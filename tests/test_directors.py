@@ -67,19 +67,52 @@ def test_current_directors_turn_about_the_edge() -> None:
 
 
 def test_renewal_keeps_the_directors() -> None:
-    """Truth: after renewal the reference is the current director, angles are 0, positions stay;
-    also when the surface has moved on since the reference was set."""
+    """Truth: renewal moves the reference to the present mean normals and the angles with it: the
+    current directors and the positions stay, though the surface has moved since."""
     model = shell(disc(2))
     state = rough(model, 3)
-    state[model.position_dofs] += 0.05 * np.random.default_rng(0).normal(
+    random = np.random.default_rng(0)
+    state[model.position_dofs] += 0.05 * random.normal(size=model.position_dofs.shape)
+    now, before = current_directors(model, state), model.directors
+    renewed = renew_directors(model, state)
+    reference = model.directors
+    assert np.abs(reference - before).max() > 0.05
+    np.testing.assert_allclose(current_directors(model, renewed), now, atol=1e-14)
+    np.testing.assert_array_equal(renewed[model.position_dofs], state[model.position_dofs])
+    start_directors(model, state)
+    np.testing.assert_allclose(reference, model.directors, atol=1e-14)
+
+
+@pytest.mark.parametrize("turns", [-2, 1, 3])
+def test_renewal_counts_turns(turns: int) -> None:
+    """Truth: an angle of several turns keeps them; it changes by what the reference turned."""
+    model = shell(disc(2))
+    state, reference = rough(model, 3), model.directors
+    state[model.position_dofs] += 0.05 * np.random.default_rng(1).normal(
         size=model.position_dofs.shape
     )
-    now = current_directors(model, state)
-    renewed = renew_directors(model, state)
-    np.testing.assert_allclose(model.directors, now, atol=1e-14)
-    np.testing.assert_allclose(current_directors(model, renewed), now, atol=1e-14)
-    np.testing.assert_array_equal(renewed[model.angle_dofs], 0.0)
-    np.testing.assert_array_equal(renewed[model.position_dofs], state[model.position_dofs])
+    once = renew_directors(model, state)
+    assert np.abs(once - state)[model.angle_dofs].max() > 0.05
+    wound = state.copy()
+    wound[model.angle_dofs] += 2 * np.pi * turns
+    model.set_directors(reference)
+    np.testing.assert_allclose(
+        renew_directors(model, wound)[model.angle_dofs],
+        once[model.angle_dofs] + 2 * np.pi * turns,
+        atol=1e-12,
+    )
+
+
+def test_folded_flat() -> None:
+    """Truth: where two triangles lie on each other the mean normal vanishes; the director is one
+    of the two, and finite."""
+    mesh = strip(2, 1, 2.0, 1.0, jitter=0.0)
+    model = shell(mesh)
+    x, y = mesh.points.T
+    state_at(model, np.c_[1 - np.abs(x - 1), y, 0 * x])
+    crease = np.isclose(mesh.points[mesh.edges, 0], 1.0).all(axis=1)
+    assert crease.sum() == 1
+    np.testing.assert_allclose(np.abs(model.directors[crease]), [[0.0, 0.0, 1.0]], atol=1e-12)
 
 
 def test_membrane_state_is_left_alone() -> None:

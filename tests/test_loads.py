@@ -182,7 +182,7 @@ def test_free_edge_resultant(bending: bool, sag: float) -> None:
 
 
 def test_free_edge_density() -> None:
-    """Truth: -d/dd of the density is stiffness * f(d), f as in (1.6b); zero beyond d_0 + width/2."""
+    """Truth: -d/dd of the density is stiffness * f(d), f as in (1.6b), 0 beyond d_0 + width/2."""
     for d in (-0.3, 0.0, 0.04, 0.2):
         variable = ufl.variable(ufl.as_ufl(d))
         density = free_edge_energy_density(variable, 50.0, 0.1, 0.01)

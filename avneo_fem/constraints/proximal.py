@@ -29,7 +29,9 @@ class ProximalTerm:
 
     def energy(self, points: Floats) -> float:
         """Energy [mN mm]."""
-        return float(self.damping / 2 * np.dot(self.node_areas, ((points - self.centre) ** 2).sum(1)))
+        return float(
+            self.damping / 2 * np.dot(self.node_areas, ((points - self.centre) ** 2).sum(1))
+        )
 
     def gradient(self, points: Floats) -> Floats:
         """(n, 3) [mN]."""

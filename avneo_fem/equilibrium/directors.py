@@ -33,17 +33,23 @@ def _across(vectors: Floats, tangent: Floats) -> Floats:
     return _unit(vectors - np.einsum("ed,ed->e", vectors, tangent)[:, None] * tangent)
 
 
+def _mean_normals(model: ShellModel, points: Floats, tangent: Floats) -> Floats:
+    """(e, 3) mean unit normal of the triangles at each edge; one's own where they oppose."""
+    a, b, c = (points[model.mesh.triangles[:, k]] for k in range(3))
+    normal = _unit(np.cross(b - a, c - a))
+    cells = model.mesh.edge_cells
+    first = normal[cells[:, 0]]
+    mean = first + normal[np.where(cells[:, 1] >= 0, cells[:, 1], cells[:, 0])]
+    folded = np.linalg.norm(mean, axis=1) < 1e-6
+    return _across(np.where(folded[:, None], first, mean), tangent)
+
+
 def start_directors(model: ShellModel, state: Floats) -> Floats:
     """Directors along the mean normal of the adjacent triangles; returns the state, angles 0."""
     if not model.parameters.bending:
         return state
     points = state[model.position_dofs]
-    a, b, c = (points[model.mesh.triangles[:, k]] for k in range(3))
-    normal = _unit(np.cross(b - a, c - a))
-    cells = model.mesh.edge_cells
-    other = np.where(cells[:, 1] >= 0, cells[:, 1], cells[:, 0])
-    tangent = _edge_tangents(model, points)
-    model.set_directors(_across(normal[cells[:, 0]] + normal[other], tangent))
+    model.set_directors(_mean_normals(model, points, _edge_tangents(model, points)))
     result = state.copy()
     result[model.angle_dofs] = 0.0
     return result
@@ -58,16 +64,23 @@ def current_directors(model: ShellModel, state: Floats) -> Floats:
 
 
 def renew_directors(model: ShellModel, state: Floats) -> Floats:
-    """Make the current directors the reference ones; the same surface, all angles 0.
+    """Measure the same directors from the present mean normals: p_e moves, alpha_e follows.
 
-    Nothing in the energy changes; it keeps p_e well away from the direction of its edge, where
-    its part across the edge would vanish.
+    Nothing in the energy changes. It keeps p_e away from the direction of its edge, where its
+    part across the edge would vanish, and close to the normals of its triangles: so the angle
+    between them, which has a jump at 180 degrees, stays small, and alpha_e counts large rotations
+    of a clamped edge without one.
     """
     if not model.parameters.bending:
         return state
-    model.set_directors(current_directors(model, state))
+    points = state[model.position_dofs]
+    tangent = _edge_tangents(model, points)
+    before = _across(model.directors, tangent)
+    after = _mean_normals(model, points, tangent)
+    sine = np.einsum("ed,ed->e", np.cross(before, after), tangent)
     result = state.copy()
-    result[model.angle_dofs] = 0.0
+    result[model.angle_dofs] -= np.arctan2(sine, np.einsum("ed,ed->e", before, after))
+    model.set_directors(after)
     return result
 
 

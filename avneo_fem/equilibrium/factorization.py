@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -30,9 +32,18 @@ class Factorization:
     def __init__(self, symmetric: bool) -> None:
         self.symmetric = symmetric
         self.count = 0
+        self._held: list[Any] = []
         self._pattern: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
 
+    def _release(self) -> None:
+        """Free the factors now: PETSc's objects outlive Python's interest in them."""
+        self._pattern = None
+        for held in self._held:
+            held.destroy()
+        self._held = []
+
     def _fresh(self, matrix: sp.csr_matrix) -> None:
+        self._release()
         self._pattern = (matrix.indptr.copy(), matrix.indices.copy())
         self._matrix = PETSc.Mat().createAIJ(
             matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF
@@ -51,6 +62,7 @@ class Factorization:
         factors.setMumpsIcntl(24, 1)  # meet null pivots, do not divide by them
         self._right = self._matrix.createVecRight()
         self._left = self._matrix.createVecRight()
+        self._held = [self._solver, self._matrix, self._right, self._left]
 
     def factorize(self, matrix: sp.csr_matrix) -> int:
         """Factorise a square CSR matrix.
@@ -82,11 +94,11 @@ class Factorization:
         try:
             self._solver.setUp()
         except PETSC_ERROR as error:
-            self._pattern = None
+            self._release()
             raise FactorizationError(str(error)) from error
         factors = self._solver.getPC().getFactorMatrix()
         if factors.getMumpsInfog(1) < 0 or factors.getMumpsInfog(28) > 0:
-            self._pattern = None
+            self._release()
             raise FactorizationError("MUMPS met a zero pivot")
         return int(factors.getMumpsInfog(12)) if self.symmetric else 0
 

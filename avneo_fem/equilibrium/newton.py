@@ -196,6 +196,8 @@ class NewtonSolver:
         result = self._full(x)
         residual = float(np.linalg.norm(system.residual(result, extra)[self._free]) / self._scale)
         snes.destroy()
+        for held in (*self._work, x):
+            held.destroy()
         text = _REASONS.get(reason, f"SNES reason {reason}")
         seconds = time.perf_counter() - clock
         return result, Verdict(residual <= tolerance, text, iterations, residual, seconds)
@@ -208,10 +210,12 @@ class NewtonSolver:
         options["snes_linesearch_type"] = "bt"
         options["snes_linesearch_max_it"] = 12
         options["snes_linesearch_maxstep"] = 1e30
-        snes.setFunction(self._residual, PETSc.Vec().createSeq(size))
+        vector = PETSc.Vec().createSeq(size)
+        snes.setFunction(self._residual, vector)
         matrix = PETSc.Mat().createPython((size, size), self, comm=PETSc.COMM_SELF)
         matrix.setUp()
         snes.setJacobian(self._jacobian, matrix, matrix)
+        self._work = (vector, matrix)
         snes.setObjective(self._objective)
         snes.setConvergenceTest(self._converged)
         solver = snes.getKSP()

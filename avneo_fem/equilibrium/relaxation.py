@@ -54,7 +54,7 @@ class Relaxation:
         system, settings = self.system, self.settings
         state = renew_directors(system.model, state)
         extra = self._damping(state, damping)
-        force = np.linalg.norm(system.residual(state)[system.free]) / system.model.load_scale()
+        force = system.relative_residual(state)
         return self.newton.solve(state, settings.inner_reduction * force, extra, iterations)
 
     def _damping(self, state: Floats, damping: float) -> list[ProximalTerm]:

@@ -42,6 +42,7 @@ class CuspMesh:
     def _edge_table(self) -> tuple[Ints, Ints, Ints]:
         sides = self.triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
         edges, inverse = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
+        inverse = inverse.ravel()
         of_cell = inverse.reshape(-1, 3)
         cells = np.full((len(edges), 2), -1)
         cell = np.repeat(np.arange(len(self.triangles)), 3)
@@ -82,7 +83,8 @@ class CuspMesh:
     def node_areas(self) -> Floats:
         """(n,) a third of the area of the triangles at each node, as in (1.4)-(1.5) [mm^2]."""
         weights = np.repeat(self.cell_areas / 3, 3)
-        return np.bincount(self.triangles.ravel(), weights, minlength=len(self.points))
+        count = len(self.points)
+        return np.asarray(np.bincount(self.triangles.ravel(), weights, minlength=count), float)
 
     @cached_property
     def suture_edges(self) -> Ints:

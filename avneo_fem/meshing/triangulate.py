@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -33,7 +34,7 @@ def _divide(breaks: Floats, size: float) -> Floats:
     """Arc lengths that divide every smooth piece evenly into lengths close to ``size``."""
     parts = [
         np.linspace(start, stop, max(1, round((stop - start) / size)) + 1)[:-1]
-        for start, stop in zip(breaks[:-1], breaks[1:], strict=True)
+        for start, stop in pairwise(breaks)
     ]
     return np.r_[np.concatenate(parts), breaks[-1]]
 
@@ -53,7 +54,9 @@ def triangulate_template(template: _Template, size: float) -> CuspMesh:
     free = _divide(np.asarray(template.free_edge.breaks), size)
     if len(suture) < 7:
         largest = float(template.suture_line.breaks[-1]) / 8
-        raise SceneError("mesh.size", size, f"too large for this template; use {largest:.3g} mm")
+        raise SceneError(
+            "mesh.size", size, f"too large for this template; use at most {largest:.3g} mm"
+        )
     outline = np.vstack(
         [template.suture_line.point(suture), template.free_edge.point(free)[-2:0:-1]]
     )
@@ -65,9 +68,9 @@ def triangulate_template(template: _Template, size: float) -> CuspMesh:
 
 def _fill(outline: Floats, size: float) -> tuple[Floats, NDArray[np.int64]]:
     """Triangles inside a counter-clockwise polygon, whose points come first in the result."""
+    interrupt = signal.getsignal(signal.SIGINT)  # before the import, which resets it already
     import gmsh
 
-    interrupt = signal.getsignal(signal.SIGINT)
     gmsh.initialize([], False)
     try:
         for option, value in (

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from avneo_fem.errors import SceneError
+
 __all__ = ["principal_stresses", "principal_stretches"]
 
 Floats = NDArray[np.float64]
@@ -34,8 +36,24 @@ def principal_stresses(stretches: Floats, model: str, young_modulus: float) -> F
 
     psi is that of ``mechanics.materials`` in principal stretches: E/4 (l1^2 + l2^2 - 2 - 2 ln l1
     l2) for ``neo_hookean``, E/8 ((l1^2 - 1)^2 + (l2^2 - 1)^2) for ``st_venant_kirchhoff``.
+
+    Parameters
+    ----------
+    stretches : (m, 2) array
+    model : str
+        ``material.model`` of the scene.
+    young_modulus : float
+        E [kPa].
+
+    Raises
+    ------
+    SceneError
+        When there is no material of that name.
     """
     square = stretches**2
     if model == "neo_hookean":
         return young_modulus / 2 * (square - 1)
-    return young_modulus / 2 * square * (square - 1)
+    if model == "st_venant_kirchhoff":
+        return young_modulus / 2 * square * (square - 1)
+    valid = "must be 'neo_hookean' or 'st_venant_kirchhoff'"
+    raise SceneError("material.model", model, valid)

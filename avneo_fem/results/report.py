@@ -22,9 +22,7 @@ from avneo_fem.stages.record import CuspResult
 __all__ = ["build_report", "geometry_report", "to_json", "write_report"]
 
 
-def geometry_report(
-    geometry: ValveGeometry, wedges: ContactWedgeFamily
-) -> dict[str, Any]:
+def geometry_report(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> dict[str, Any]:
     """The ``geometry`` part of the report (design.md §2); also what ``avneo check`` prints."""
     plane, triple, cusps = geometry.commissures, geometry.triple_contact, geometry.cusps
     return {

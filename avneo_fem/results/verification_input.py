@@ -62,7 +62,9 @@ def tolerances_of(scene: Scene, geometry: ValveGeometry) -> Tolerances:
     sutured edges themselves are apart; the wall its clearance beyond the taper.
     """
     halves = sorted(cusp.thickness / 2 for cusp in geometry.cusps)
-    wedge = 2 * halves[0] if scene.contact.clearance is None else 2 * scene.contact.clearance
+    wedge = (
+        halves[0] + halves[1] if scene.contact.clearance is None else 2 * scene.contact.clearance
+    )
     radius, gap = geometry.root.radius, scene.commissures.gap
     edges_apart = 2 * radius * np.sin(gap / (2 * radius))
     return Tolerances(

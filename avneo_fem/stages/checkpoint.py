@@ -7,7 +7,6 @@ import json
 import pickle
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,11 @@ Floats = NDArray[np.float64]
 
 @dataclass
 class Checkpoint:
-    """Where a cusp stands: the state, what it took, and how many levels are complete."""
+    """Where a cusp stands: the state, what it took, and how many levels are complete.
+
+    ``finished`` says that nothing is left to do; then ``residual`` and ``failure`` are those of
+    the result.
+    """
 
     state: Floats
     directors: Floats
@@ -31,6 +34,9 @@ class Checkpoint:
     penalty_stiffness: tuple[float, float]
     records: list[StageRecord]
     snapshots: list[Snapshot]
+    finished: bool = False
+    residual: float = float("nan")
+    failure: str | None = None
 
 
 class CheckpointStore:
@@ -57,15 +63,16 @@ class CheckpointStore:
     def load(self, index: int) -> Checkpoint | None:
         """The checkpoint of a cusp, None when there is none for this scene."""
         try:
-            data: Any = pickle.loads(self.path(index).read_bytes())
-        except (OSError, pickle.UnpicklingError, EOFError, AttributeError):
+            key, checkpoint = pickle.loads(self.path(index).read_bytes())
+        except Exception:  # bytes that are no pickle can raise anything
             return None
-        key, checkpoint = data
-        return checkpoint if key == self.key else None
+        fits = key == self.key and isinstance(checkpoint, Checkpoint)
+        return checkpoint if fits else None
 
     def clear(self) -> None:
-        """Remove all checkpoints of the run."""
-        for path in self.folder.glob("cusp_*.checkpoint"):
-            path.unlink(missing_ok=True)
+        """Remove all checkpoints of the run, and what a kill while writing one left."""
+        for pattern in ("cusp_*.checkpoint", ".cusp_*.checkpoint"):
+            for path in self.folder.glob(pattern):
+                path.unlink(missing_ok=True)
         if self.folder.is_dir() and not any(self.folder.iterdir()):
             self.folder.rmdir()

@@ -36,7 +36,7 @@ def clearances(scene: Scene, index: int, distance_to_suture: Floats) -> tuple[Fl
     taper = 5 * thickness if scene.wall.taper is None else scene.wall.taper
     share = np.ones(len(distance_to_suture))
     if taper > 0:
-        share = np.minimum(1.0, distance_to_suture / taper) ** 2
+        share = np.square(np.minimum(1.0, distance_to_suture / taper))
     return wall * share, np.full(len(distance_to_suture), wedge)
 
 

@@ -63,45 +63,85 @@ class CuspSuturing:
 
     def run(self, resume: bool = False) -> CuspResult:
         """Run all stages; a failure is part of the result, with the last good state."""
-        clock, setup, failure = time.perf_counter(), self.setup, None
-        state, done = self._begin(resume)
-        try:
-            for number, (name, before, after) in enumerate(self._levels()):
-                self._activate(name, after)
-                if number >= done:
-                    state = self._level(state, name, before, after, number + 1)
-            state = self._raise_until_inside(state)
-        except StageFailed as error:
-            state, failure = error.state, str(error)
+        clock, setup = time.perf_counter(), self.setup
+        state, done = self._begin()
+        checkpoint = self.store.load(setup.index) if resume and self.store else None
+        if checkpoint is not None:
+            state, done = self._go_on_from(checkpoint), checkpoint.levels_done
+        if checkpoint is not None and checkpoint.finished:
+            failure, residual = checkpoint.failure, checkpoint.residual
+        else:
+            state, failure = self._run_from(state, done)
+            residual = setup.system.relative_residual(state)
+            self._save(state, done, True, residual, failure)
+        self.final_state = state
         return CuspResult(
             index=setup.index,
             mesh=setup.mesh,
             points=setup.system.positions(state),
             records=self.records,
             snapshots=self.snapshots,
-            residual=setup.system.relative_residual(state),
+            residual=residual,
             dofs=setup.model.size,
             failure=failure,
             compile_seconds=setup.compile_seconds,
             seconds=time.perf_counter() - clock,
         )
 
-    def _begin(self, resume: bool) -> tuple[Floats, int]:
-        """First state, or that of the checkpoint, and the number of levels it has behind it."""
+    def _run_from(self, state: Floats, done: int) -> tuple[Floats, str | None]:
+        """All levels after the first ``done``; last good state, and what failed if anything did."""
+        try:
+            for number, (name, before, after) in enumerate(self._levels()):
+                self._activate(name, after)
+                if number >= done:
+                    state = self._level(state, name, before, after, number + 1)
+            return self._raise_until_inside(state), None
+        except StageFailed as error:
+            return error.state, str(error)
+
+    def _begin(self) -> tuple[Floats, int]:
+        """First state, and no level behind it."""
         setup, model = self.setup, self.setup.model
         away = setup.target - setup.start[setup.mesh.suture_line]
         self._way = harmonic_extension(setup.mesh, away)
         state = np.zeros(model.size)
         state[model.position_dofs] = setup.start
-        state = start_directors(model, state)
-        checkpoint = self.store.load(setup.index) if resume and self.store else None
-        if checkpoint is None:
-            return state, 0
+        return start_directors(model, state), 0
+
+    def _go_on_from(self, checkpoint: Checkpoint) -> Floats:
+        """Take over what a checkpoint holds; its state."""
+        setup = self.setup
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         setup.wall.stiffness, setup.wedge.stiffness = checkpoint.penalty_stiffness
-        if model.parameters.bending:
-            model.set_directors(checkpoint.directors)
-        return checkpoint.state, checkpoint.levels_done
+        if setup.model.parameters.bending:
+            setup.model.set_directors(checkpoint.directors)
+        return checkpoint.state
+
+    def _save(
+        self,
+        state: Floats,
+        done: int,
+        finished: bool = False,
+        residual: float = float("nan"),
+        failure: str | None = None,
+    ) -> None:
+        if self.store is None:
+            return
+        setup = self.setup
+        directors = setup.model.directors if setup.model.parameters.bending else np.empty((0, 3))
+        stiffness = (setup.wall.stiffness, setup.wedge.stiffness)
+        kept = Checkpoint(
+            state=state,
+            directors=directors,
+            levels_done=done,
+            penalty_stiffness=stiffness,
+            records=self.records,
+            snapshots=self.snapshots,
+            finished=finished,
+            residual=residual,
+            failure=failure,
+        )
+        self.store.save(setup.index, kept)
 
     # -- levels ----------------------------------------------------------------------------
     def _levels(self) -> list[tuple[str, float, float]]:
@@ -152,11 +192,26 @@ class CuspSuturing:
                 reason = reason or "converged: residual below tolerance"
             except StageFailed as error:
                 failure, state = error, error.state
-                reason, after, steps, done = str(error), error.parameter, error.steps, done - 1
-        self._keep(state, name, after, used, reason, clock, steps, done)
+                reason, after, steps = str(error), error.parameter, error.steps
+                self._go_back(name, after)
+        # a failed level is no place to go on from: it would be run again from its middle
+        kept = done if failure is None else None
+        self._keep(state, name, after, used, reason, clock, steps, kept)
         if failure is not None:
             raise failure
         return state
+
+    def _go_back(self, name: str, parameter: float) -> None:
+        """Undo what the failed attempt set, so that residual and fields are those of the state."""
+        setup = self.setup
+        if name == "boundary":
+            setup.model.pressure = self._pressure(parameter)
+        elif name == "contact_wedge":
+            setup.wedge.field = setup.wedges.wedge(setup.index, max(parameter, 0.0))
+
+    def _pressure(self, share: float) -> float:
+        """Pressure while the edge has gone this share of its way [kPa]."""
+        return self.setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, share)
 
     def _keep(
         self,
@@ -167,9 +222,9 @@ class CuspSuturing:
         reason: str,
         clock: float,
         steps: int,
-        done: int,
+        done: int | None,
     ) -> None:
-        """Record, snapshot and checkpoint of a level."""
+        """Record and snapshot of a level, and a checkpoint with ``done`` levels behind it."""
         setup = self.setup
         residual = setup.system.relative_residual(state)
         spent = setup.newton.iterations - used
@@ -179,11 +234,8 @@ class CuspSuturing:
         self.records.append(record)
         self.snapshots.append(Snapshot(name, parameter, points, self._fields(points)))
         self.observer(setup.index, record)
-        if self.store is not None:
-            directors = setup.model.directors
-            stiffness = (setup.wall.stiffness, setup.wedge.stiffness)
-            kept = Checkpoint(state, directors, done, stiffness, self.records, self.snapshots)
-            self.store.save(setup.index, kept)
+        if done is not None:
+            self._save(state, done)
 
     def _fields(self, points: Floats) -> dict[str, Floats]:
         """Distances and penalty pressure at the nodes, for ParaView."""
@@ -219,11 +271,12 @@ class CuspSuturing:
         trial[model.position_dofs[line]] = setup.start[line] + stop * (
             setup.target - setup.start[line]
         )
-        model.pressure = setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, stop)
+        model.pressure = self._pressure(stop)
         return self._damped(trial)
 
     def _damped(self, trial: Floats) -> Outcome:
-        state, verdict = self.setup.relaxation.damped(trial, _BOUNDARY_DAMPING, _BOUNDARY_ITERATIONS)
+        relaxation = self.setup.relaxation
+        state, verdict = relaxation.damped(trial, _BOUNDARY_DAMPING, _BOUNDARY_ITERATIONS)
         return (state if np.isfinite(verdict.residual) else None), verdict.reason
 
     def _settle_hinged(self, state: Floats, _start: float, _stop: float) -> Outcome:
@@ -271,10 +324,11 @@ class CuspSuturing:
                     raised = True
             if not raised:
                 state = self._converge(state, "equilibrium", self.options.tolerance)
+                wall, wedge = setup.wall.stiffness, setup.wedge.stiffness
                 message = (
                     f"root_wall: {misses[0]:.3f} mm short of the clearance from the wall and"
-                    f" {misses[1]:.3f} mm from the contact wedge at eta_1 = {setup.wall.stiffness:g}"
-                    f" and {setup.wedge.stiffness:g} kPa; raise wall.maximum_stiffness,"
+                    f" {misses[1]:.3f} mm from the contact wedge at eta_1 = {wall:g}"
+                    f" and {wedge:g} kPa; raise wall.maximum_stiffness,"
                     " contact.maximum_stiffness or solver.inside_tolerance"
                 )
                 raise StageFailed(message, state, setup.wall.stiffness, 0)

@@ -32,11 +32,10 @@ def _congruent(
         return False
     first, second = (geometry.cusps[i].suture_line for i in (source, copy))
     turn, scale = _turn(geometry, source, copy), geometry.root.radius
-    pairs = [
-        (first.point(np.linspace(0, first.length, 9)), second.point(np.linspace(0, second.length, 9)))
-        if np.isclose(first.length, second.length, rtol=1e-12)
-        else (np.zeros((1, 3)), np.ones((1, 3)))
-    ]
+    if not np.isclose(first.length, second.length, rtol=1e-12):
+        return False
+    share = np.linspace(0.0, 1.0, 9)
+    pairs = [(first.point(share * first.length), second.point(share * second.length))]
     plane = geometry.commissures.points
     for step in range(3):
         pairs.append((plane[[(source + step) % 3]], plane[[(copy + step) % 3]]))

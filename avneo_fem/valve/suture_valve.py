@@ -9,14 +9,29 @@ from avneo_fem.compat import MPI, clear_stale_kernels
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.triangulate import triangulate_template
-from avneo_fem.scene import Scene
+from avneo_fem.scene import Template
 from avneo_fem.stages.checkpoint import CheckpointStore
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.record import CuspResult, StageRecord
 from avneo_fem.stages.suturing import CuspSuturing
 from avneo_fem.valve.congruence import representatives, rotate_result
 
-__all__ = ["suture_valve"]
+__all__ = ["mesh_templates", "suture_valve"]
+
+
+def mesh_templates(given: ValveInput) -> dict[Template, CuspMesh]:
+    """A mesh of every different template of a scene; the same on all ranks.
+
+    Raises
+    ------
+    SceneError
+        When ``mesh.size`` is too large for one of them.
+    """
+    meshes: dict[Template, CuspMesh] = {}
+    for table, cusp in zip(given.scene.cusp, given.geometry.cusps, strict=True):
+        if table.template not in meshes:
+            meshes[table.template] = triangulate_template(cusp.template, given.scene.mesh_size)
+    return meshes
 
 
 def suture_valve(
@@ -26,6 +41,7 @@ def suture_valve(
     resume: bool = False,
     only: int | None = None,
     comm: Any = MPI.COMM_WORLD,
+    meshes: dict[Template, CuspMesh] | None = None,
 ) -> list[CuspResult]:
     """Run the stages of every cusp.
 
@@ -44,6 +60,8 @@ def suture_valve(
         Just this cusp.
     comm : MPI communicator
         Cusps are dealt out to its ranks.
+    meshes : dict or None
+        What :func:`mesh_templates` gives, if at hand.
 
     Returns
     -------
@@ -59,16 +77,13 @@ def suture_valve(
     if only is None and scene.reuse_congruent and comm.size < len(wanted):
         same = representatives(scene, given.geometry, given.wedges)
     to_solve = sorted(set(same))
-    meshes: dict[Any, CuspMesh] = {}
+    meshes = mesh_templates(given) if meshes is None else meshes
     mine = []
     for number, index in enumerate(to_solve):
         if number % comm.size != comm.rank:
             continue
-        template = scene.cusp[index].template
-        if template not in meshes:
-            cusp = given.geometry.cusps[index]
-            meshes[template] = triangulate_template(cusp.template, scene.mesh_size)
-        setup = CuspSetup(scene, given.geometry, given.wedges, index, meshes[template])
+        mesh = meshes[scene.cusp[index].template]
+        setup = CuspSetup(scene, given.geometry, given.wedges, index, mesh)
         mine.append(CuspSuturing(setup, observer, store).run(resume))
     gathered = comm.gather(mine, root=0)
     if comm.rank != 0:

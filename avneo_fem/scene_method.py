@@ -1,0 +1,114 @@
+"""Tables of the scene that describe the method: material, constraints, mesh and solver.
+
+Units are mm, kPa and mN. Symbols of the paper stand beside the names; a unit in brackets in a
+description ends up in docs/scene.md.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from avneo_fem.scene_tables import Finite, NonNegative, Positive, Table
+
+__all__ = [
+    "Contact",
+    "FreeEdge",
+    "Material",
+    "Mesh",
+    "Placement",
+    "Solver",
+    "Wall",
+]
+
+
+class Material(Table):
+    """Hyperelastic material of the pericardium, Poisson ratio 0 (paper §1.1)."""
+
+    model: Literal["neo_hookean", "st_venant_kirchhoff"] = Field(
+        "neo_hookean", description="membrane energy; the paper's is st_venant_kirchhoff (1.3)"
+    )
+    young_modulus: Positive = Field(1000.0, description="E [kPa]")
+    bending: bool = Field(True, description="Kirchhoff-Love bending (c^b of (1.7))")
+
+
+class FreeEdge(Table):
+    """Force that keeps the free edge from sagging (paper (1.6))."""
+
+    stiffness: NonNegative = Field(80.0, description="eta_1 [kPa]")
+    width: Positive = Field(0.1, description="eta_2 [mm]")
+    clearance: Finite = Field(0.0, description="d_0 = -eta_3 [mm]")
+
+
+class Contact(Table):
+    """Contact wedge between the cusps (paper §3.3.2, (1.5))."""
+
+    stiffness: Positive = Field(16.0, description="eta_1 at the start [kPa]")
+    width: Positive = Field(0.1, description="eta_2 [mm]")
+    clearance: NonNegative | None = Field(
+        None, description="d_0 of the mid-surface [mm]; default half the thickness"
+    )
+    omega: Positive = Field(0.5, description="omega of (3.3a)")
+    steps: Annotated[int, Field(ge=1)] = Field(10, description="number of lambda steps, 0 to 1")
+    maximum_stiffness: Positive = Field(4096.0, description="eta_1 is not raised beyond [kPa]")
+
+
+class Wall(Table):
+    """Contact with the wall of the root (paper §3.4 step 3, (1.5))."""
+
+    stiffness: Positive = Field(8.0, description="eta_1 at the start [kPa]")
+    width: Positive = Field(0.5, description="eta_2 [mm]")
+    clearance: Finite | None = Field(
+        None, description="d_0 of the mid-surface away from the suture [mm]; default H/2"
+    )
+    taper: NonNegative | None = Field(
+        None, description="distance over which d_0 grows from the suture [mm]; default 5 H"
+    )
+    growth: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
+        4.0, description="factor by which eta_1 is raised until the cusp is inside"
+    )
+    maximum_stiffness: Positive = Field(4096.0, description="eta_1 is not raised beyond [kPa]")
+
+
+class Mesh(Table):
+    """Triangulation of the template."""
+
+    size: Positive = Field(0.7, description="h, target edge length [mm]")
+
+
+class Placement(Table):
+    """Where the flat template starts (paper §3.2, step 1)."""
+
+    c0: NonNegative = Field(1.0, description="c^0, distance from the chord in units of R")
+    c1: Positive = Field(0.1, description="c^1, increment of that distance")
+
+
+class Solver(Table):
+    """Continuation and Newton iteration."""
+
+    tolerance: Positive = Field(
+        1e-8, description="final residual relative to the pressure load P x area"
+    )
+    path_tolerance: Positive = Field(1e-4, description="the same for the equilibria on the way")
+    boundary_steps: Annotated[int, Field(ge=1)] = Field(
+        20, description="nominal steps of the sutured edge from template to suture line"
+    )
+    clamp_steps: Annotated[int, Field(ge=1)] = Field(
+        5, description="nominal steps that turn the sutured edge into its tangent half-plane"
+    )
+    smallest_step: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+        1.0 / 256.0, description="a nominal step may be divided down to this share of itself"
+    )
+    maximum_iterations: Annotated[int, Field(ge=1)] = Field(
+        400, description="Newton iterations that one step of a stage may spend"
+    )
+    barrier_distance: Positive | None = Field(
+        None, description="self-contact acts below it [mm]; default min(0.3 H, 0.2 h)"
+    )
+    barrier_stiffness: Positive = Field(
+        0.05, description="self-contact stiffness in units of E H over barrier_distance squared"
+    )
+    inside_tolerance: Positive = Field(
+        0.05, description="wedge and wall may be short of their clearance by [mm]"
+    )

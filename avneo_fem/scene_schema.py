@@ -1,0 +1,60 @@
+"""The scene as one immutable object: the tables and what holds for the whole run."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from avneo_fem.scene_method import Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
+from avneo_fem.scene_tables import (
+    Commissures,
+    Competence,
+    Cusp,
+    Positive,
+    Root,
+    Stitching,
+    Table,
+)
+
+__all__ = ["FIDELITIES", "Scene"]
+
+#: Named bundles for ``--fidelity``: factor on ``mesh.size``.
+FIDELITIES: dict[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.7, "reference": 0.5}
+
+
+class Scene(Table):
+    """A complete, resolved scene. Build it in code or with :func:`avneo_fem.scene.load_scene`.
+
+    ``template`` and ``suture_line`` hold for all three cusps; ``cusp``, when given, lists three
+    tables that override single entries of them.
+    """
+
+    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] = Field(
+        "scene",
+        description="names the output folder out/NAME; a file without it is named after itself",
+    )
+    diastolic_pressure: Positive = Field(8.0, description="P [kPa]")
+    root: Root = Field(default_factory=Root)
+    commissures: Commissures = Field(default_factory=Commissures)
+    cusp: tuple[Cusp, Cusp, Cusp] = Field(default_factory=lambda: (Cusp(), Cusp(), Cusp()))
+    stitching: Stitching = Field(default_factory=Stitching)
+    competence: Competence = Field(default_factory=Competence)
+    material: Material = Field(default_factory=Material)
+    free_edge: FreeEdge = Field(default_factory=FreeEdge)
+    contact: Contact = Field(default_factory=Contact)
+    wall: Wall = Field(default_factory=Wall)
+    mesh: Mesh = Field(default_factory=Mesh)
+    placement: Placement = Field(default_factory=Placement)
+    solver: Solver = Field(default_factory=Solver)
+    reuse_congruent: bool = Field(
+        True, description="solve congruent cusps once and rotate the result"
+    )
+    fidelity: Literal["draft", "standard", "fine", "reference"] = Field(
+        "standard", description="quality bundle; multiplies mesh.size by 2, 1, 0.7, 0.5"
+    )
+
+    @property
+    def mesh_size(self) -> float:
+        """Target edge length after ``fidelity`` [mm]."""
+        return self.mesh.size * FIDELITIES[self.fidelity]

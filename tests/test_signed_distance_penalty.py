@@ -1,0 +1,154 @@
+"""The penalty of paper (1.5) against Taylor's theorem, its formula and hand-made volumes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from term_cases import taylor_orders
+from valve_cases import experiment
+
+from avneo_fem.constraints.signed_distance_penalty import SignedDistance, SignedDistancePenalty
+from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.root import CylinderRoot
+
+RADIUS = 12.0
+
+
+class HalfSpace:
+    """z > level, with a count of how often it is asked."""
+
+    def __init__(self, level: float) -> None:
+        self.level, self.calls = level, 0
+
+    def evaluate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """z - level, e_z, 0."""
+        self.calls += 1
+        up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+        return points[:, 2] - self.level, up, np.zeros((len(points), 3, 3))
+
+
+def cylinder() -> SignedDistance:
+    """The root of all experiments."""
+    return CylinderRoot(RADIUS)
+
+
+def wedge_field() -> SignedDistance:
+    """Contact wedge of cusp 1 of Experiment 3 at lambda = 0.6."""
+    valve = experiment(3, "code")
+    plane = valve.commissures
+    family = ContactWedgeFamily(
+        plane.points, valve.triple_contact.point, plane.normal, valve.contact_lengths
+    )
+    return family.wedge(1, 0.6)
+
+
+VOLUMES = pytest.mark.parametrize("build", [cylinder, wedge_field], ids=["root", "wedge"])
+
+
+def nodes_near(field: SignedDistance, low: float, high: float, count: int = 12) -> np.ndarray:
+    """Points of the root's inside whose distance lies between ``low`` and ``high``."""
+    rng = np.random.default_rng(7)
+    points = rng.uniform(-RADIUS, RADIUS, (60000, 3))
+    distance = field.evaluate(points)[0]
+    found = points[(distance > low) & (distance < high)]
+    assert len(found) >= count
+    return found[:count]
+
+
+def penalty_of(field: SignedDistance, count: int, **changes: float) -> SignedDistancePenalty:
+    """Unequal nodes, eta_1 = 16 kPa, eta_2 = 1 mm, d_0 from 0.1 mm on."""
+    values = {"stiffness": 16.0, "width": 1.0, **changes}
+    areas, clearance = np.linspace(0.5, 2.0, count), np.linspace(0.1, 0.3, count)
+    return SignedDistancePenalty(field, areas, values["stiffness"], values["width"], clearance)
+
+
+@VOLUMES
+def test_gradient_and_hessian(build: Callable[[], SignedDistance]) -> None:
+    """Truth: Taylor's theorem, remainders of order two for energy and gradient, with curvature.
+
+    The nodes stay in the active range for every step, and off the planes where the closest part of
+    the wedge's border changes: there the energy is smooth.
+    """
+    field = build()
+    points = nodes_near(field, -1.0, 0.3)
+    penalty = penalty_of(field, len(points))
+    direction = np.random.default_rng(8).normal(size=points.shape)
+    direction *= 0.1 / np.linalg.norm(direction, axis=1)[:, None]
+    assert np.all(penalty.ramp(points) > 0)
+    for orders in taylor_orders(penalty, points, direction):
+        assert orders == pytest.approx([2.0] * 4, abs=0.05)
+    hessian = penalty.hessian(points).toarray()
+    assert np.abs(hessian - hessian.T).max() < 1e-12 * np.abs(hessian).max()
+
+
+@VOLUMES
+def test_nothing_outside_the_active_range(build: Callable[[], SignedDistance]) -> None:
+    """Truth: (1.5) vanishes for d >= d_0 + eta_2 / 2."""
+    field = build()
+    points = nodes_near(field, 0.85, 3.0)
+    penalty = penalty_of(field, len(points))
+    assert penalty.energy(points) == 0.0
+    assert not penalty.gradient(points).any()
+    assert not penalty.hessian(points).toarray().any()
+    assert not penalty.shortfall(points).any()
+
+
+def test_force_at_the_clearance() -> None:
+    """Truth: (1.5) with d = d_0 is eta_1 S_n towards the axis; half as much half way out."""
+    count = 9
+    penalty = penalty_of(CylinderRoot(RADIUS), count)
+    angle = np.linspace(0.0, 6.0, count)
+    axis = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
+    rise = [0.0, 0.0, 3.0]
+    for share, factor in ((0.0, 1.0), (0.25, 0.5), (0.5, 0.0), (-0.5, 2.0)):
+        points = (RADIUS - penalty.clearance - share * penalty.width)[:, None] * axis + rise
+        force = -penalty.gradient(points)
+        expected = -factor * 16.0 * penalty.node_areas[:, None] * axis
+        assert force == pytest.approx(expected, abs=1e-11)
+        assert penalty.energy(points) == pytest.approx(
+            16.0 / 4 * factor**2 * penalty.node_areas.sum(), abs=1e-11
+        )
+        assert penalty.shortfall(points) == pytest.approx([max(-share, 0.0)] * count, abs=1e-12)
+
+
+def test_half_space_by_hand() -> None:
+    """Truth: a spring eta_1 S_n 2/eta_2 per node: one number for energy, force and stiffness."""
+    penalty = SignedDistancePenalty(
+        HalfSpace(1.0), np.array([3.0, 3.0]), 8.0, 0.5, np.array([0.25, 0.25])
+    )
+    points = np.array([[5.0, 6.0, 1.25], [7.0, 8.0, 1.6]])
+    assert penalty.energy(points) == pytest.approx(8.0 * 3.0 * 0.5 / 4)
+    assert penalty.gradient(points).tolist() == [[0.0, 0.0, -24.0], [0.0, 0.0, 0.0]]
+    dense = penalty.hessian(points).toarray()
+    assert dense[2, 2] == pytest.approx(24.0 * 2 / 0.5)
+    assert np.count_nonzero(dense) == 1
+    assert penalty.hessian(points).shape == (6, 6)
+
+
+def test_stiffness_and_width_act_at_once() -> None:
+    """Truth: energy, force and tangent are linear in eta_1, also when it is raised later."""
+    points = nodes_near(CylinderRoot(RADIUS), -1.0, 0.2)
+    penalty = penalty_of(CylinderRoot(RADIUS), len(points))
+    before = penalty.energy(points), penalty.gradient(points), penalty.hessian(points).toarray()
+    penalty.stiffness *= 3.0
+    assert penalty.energy(points) == pytest.approx(3.0 * before[0], rel=1e-14)
+    assert penalty.gradient(points) == pytest.approx(3.0 * before[1], rel=1e-14)
+    assert penalty.hessian(points).toarray() == pytest.approx(3.0 * before[2], rel=1e-14)
+
+
+def test_a_replaced_field_is_asked_again() -> None:
+    """Truth: the kept answer belongs to one field and one set of points, and is kept for these."""
+    first, second = HalfSpace(0.0), HalfSpace(10.0)
+    points = np.array([[0.0, 0.0, 4.0]])
+    penalty = SignedDistancePenalty(first, np.ones(1), 1.0, 1.0, np.zeros(1))
+    assert penalty.evaluate(points)[0].tolist() == [4.0]
+    penalty.energy(points), penalty.gradient(points), penalty.hessian(points)
+    assert first.calls == 1
+    penalty.field = second
+    assert penalty.field is second
+    assert penalty.evaluate(points)[0].tolist() == [-6.0]
+    points[0, 2] = 12.0  # the same array, changed in place
+    assert penalty.evaluate(points)[0].tolist() == [2.0]
+    assert (first.calls, second.calls) == (1, 2)
