@@ -8,10 +8,10 @@ the same functions.
 
 from __future__ import annotations
 
+import fcntl
 import logging
 import os
 import sys
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,6 +27,10 @@ _log_level, _log_handlers = logging.root.level, list(logging.root.handlers)
 try:
     sys.setdlopenflags = lambda _flags: None  # type: ignore[assignment]
     import basix
+    import petsc4py
+
+    # PETSc's own handlers would turn a closed pipe or a Ctrl-C into an MPI abort
+    petsc4py.init(["avneo", "-no_signal_handler"])
     import dolfinx
     import ufl
     from dolfinx import fem, mesh
@@ -69,13 +73,25 @@ _JIT_KEYWORD = "jit_params" if _elements is None else "jit_options"
 
 
 def kernel_cache() -> Path:
-    """Folder in which DOLFINx keeps its compiled kernels."""
+    """Folder of this project's compiled kernels."""
     root = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(root) / "fenics"
+    return Path(root) / "avneo_fem"
 
 
-def clear_stale_kernels(older_than_s: float = 600.0) -> int:
+@contextmanager
+def _cache_lock(kind: int) -> Iterator[None]:
+    """Hold the kernel cache: shared while compiling, alone while clearing it."""
+    folder = kernel_cache()
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".lock").open("a") as lock:
+        fcntl.flock(lock, kind)
+        yield
+
+
+def clear_stale_kernels() -> int:
     """Remove kernels whose compilation was killed; they would block every later run.
+
+    Nothing is done while another process is compiling.
 
     Returns
     -------
@@ -83,30 +99,34 @@ def clear_stale_kernels(older_than_s: float = 600.0) -> int:
         Number of files removed.
     """
     removed = 0
-    for source in kernel_cache().glob("*.c"):
-        done = source.with_suffix(".c.cached")
-        try:
-            if not done.exists() and time.time() - source.stat().st_mtime > older_than_s:
-                source.unlink()
-                removed += 1
-        except OSError:
-            continue
+    try:
+        with _cache_lock(fcntl.LOCK_EX | fcntl.LOCK_NB):
+            for source in kernel_cache().glob("*.c"):
+                if not source.with_suffix(".c.cached").exists():
+                    source.unlink()
+                    removed += 1
+    except BlockingIOError:
+        return 0
     return removed
 
 
 @contextmanager
-def _known_warnings_hidden() -> Iterator[None]:
-    """Hide what FFCx and cffi warn of on a cache miss, so that warnings may be errors elsewhere."""
-    with warnings.catch_warnings():
+def _compiling() -> Iterator[dict[str, Any]]:
+    """Options for one compilation: flags, cache and lock, and no noise.
+
+    FFCx and cffi warn on a cache miss of what they do themselves; exactly that is hidden, so that
+    warnings may be errors elsewhere.
+    """
+    with _cache_lock(fcntl.LOCK_SH), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "unclosed file .*libffcx", ResourceWarning)
         warnings.filterwarnings("ignore", "The distutils", DeprecationWarning)
-        yield
+        yield {_JIT_KEYWORD: {**_JIT, "cache_dir": str(kernel_cache())}}
 
 
 def compile_form(form: Any) -> Any:
     """Compile a UFL form with this project's compiler flags (cached on disk by signature)."""
-    with _known_warnings_hidden():
-        return _form(form, **{_JIT_KEYWORD: _JIT})
+    with _compiling() as options:
+        return _form(form, **options)
 
 
 def create_mesh(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Any:
@@ -168,8 +188,8 @@ def scalar_element(domain: Any, family: str) -> Any:
 def function_space(domain: Any, element: Any) -> Any:
     """Function space of a UFL element."""
     make: Any = fem.functionspace if hasattr(fem, "functionspace") else fem.FunctionSpace
-    with _known_warnings_hidden():
-        return make(domain, element, **{_JIT_KEYWORD: _JIT})
+    with _compiling() as options:
+        return make(domain, element, **options)
 
 
 def mixed_space(domain: Any, elements: list[Any]) -> Any:

@@ -57,7 +57,11 @@ class Contact(Table):
 class Wall(Table):
     """Contact with the wall of the root (paper §3.4 step 3, (1.5))."""
 
-    stiffness: Positive = Field(8.0, description="eta_1 at the start [kPa]")
+    stiffness: Positive = Field(
+        64.0,
+        description="eta_1 at the start [kPa]; with Table 1's 8 kPa a coarse cusp can slip behind"
+        " its own sutured edge before the wall stops it",
+    )
     width: Positive = Field(0.5, description="eta_2 [mm]")
     clearance: Finite | None = Field(
         None, description="d_0 of the mid-surface away from the suture [mm]; default H/2"

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.commissure import (
     CommissurePlane,
+    angles_of_sides,
     commissure_angles,
     commissure_directions,
     contact_lengths,
@@ -28,6 +29,17 @@ def test_angles_follow_the_law_of_cosines(a: float, b: float, share: float) -> N
         j, k = (i + 1) % 3, (i + 2) % 3
         square = ratio[j] ** 2 + ratio[k] ** 2 - 2.0 * ratio[j] * ratio[k] * np.cos(alpha[i])
         assert square == pytest.approx(ratio[i] ** 2, abs=1e-11 * ratio.max() ** 2)
+
+
+def test_angles_of_thin_and_open_triangles() -> None:
+    """Truth: small-angle expansion for sides 1, 1, 1e-7; pi, 0, 0 where the sides do not close."""
+    thin, flat, broken = angles_of_sides(
+        np.array([[1.0, 1.0, 1e-7], [2.0, 1.0, 1.0], [3.0, 1.0, 1.0]])
+    )
+    assert thin[2] == pytest.approx(1e-7, rel=1e-7)
+    assert thin[:2] == pytest.approx([np.pi / 2 - 0.5e-7] * 2, rel=1e-13)
+    assert flat == pytest.approx([np.pi, 0.0, 0.0], abs=1e-15)
+    assert broken == pytest.approx([np.pi, 0.0, 0.0], abs=1e-15)
 
 
 @pytest.mark.parametrize("ratio", [(1.0, 1.0, 1.0), (8.0, 9.0, 6.0), (6.0, 4.0, 5.0), (2, 2, 3.9)])

@@ -94,6 +94,16 @@ def test_smallest_k(reach: float, constants: dict[str, float], expected: int) ->
     assert pierces(line, placed[HALVES] - [0.0, 2.0 * c1, 0.0]) == (k > 0)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_it_stands_off_towards_the_third_commissure(side: float) -> None:
+    """Truth: (LK, A_(i+1)A_i) > 0 on whichever side of the chord A_i lies."""
+    apex, up = np.array([0.3, 5.0 * side, 0.0]), np.array([0.0, 0.0, 1.0])
+    far = np.array([[9.0, 9.0, 9.0], [9.0, 9.0, 10.0]])
+    placed, k = place_template(SHEET, HALVES, 1.0, CHORD, apex, up, 2.0, far)
+    assert k == 0
+    assert placed.tolist() == [[x, 2.0 * side, z - 1.0] for x, z in SHEET.tolist()]
+
+
 def test_no_distance_will_do() -> None:
     """Truth: a line longer than 200 steps is an error that names the step."""
     line = np.array([[0.3, -1.0, -0.5], [0.3, 50.0, -0.5]])

@@ -13,7 +13,16 @@ __all__ = ["ValveInput"]
 
 @dataclass(frozen=True)
 class ValveInput:
-    """A scene with the geometry that follows from it."""
+    """A scene with the geometry that follows from it.
+
+    Attributes
+    ----------
+    scene : Scene
+    geometry : ValveGeometry
+        Templates, suture lines, commissures and triple contact point.
+    wedges : ContactWedgeFamily
+        The contact wedges of the three cusps, lambda = 0 ... 1.
+    """
 
     scene: Scene
     geometry: ValveGeometry
@@ -26,7 +35,8 @@ class ValveInput:
         Raises
         ------
         SceneError
-            When the scene is geometrically impossible.
+            When the scene is geometrically impossible, which includes a contact wedge whose two
+            curves cross at one of the run's lambda.
         """
         geometry = ValveGeometry.from_scene(scene)
         wedges = ContactWedgeFamily(
@@ -36,4 +46,7 @@ class ValveInput:
             geometry.contact_lengths,
             scene.contact.omega,
         )
+        for index in range(3):
+            for step in range(scene.contact.steps + 1):
+                wedges.wedge(index, step / scene.contact.steps)
         return cls(scene, geometry, wedges)

@@ -15,9 +15,20 @@ Floats = NDArray[np.float64]
 
 
 def harmonic_extension(mesh: CuspMesh, values: Floats) -> Floats:
-    """(n, d) discrete harmonic functions with ``values`` (k, d) at ``mesh.suture_line``.
+    """Discrete harmonic functions with given values at the suture line (design.md §3).
 
     The free edge is left to its natural condition.
+
+    Parameters
+    ----------
+    mesh : CuspMesh
+    values : (k, d) array
+        What to extend, at ``mesh.suture_line``.
+
+    Returns
+    -------
+    (n, d) array
+        At all nodes; exactly ``values`` at the suture line.
     """
     corners = mesh.points[mesh.triangles]
     opposite = np.stack([corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3] for k in range(3)], 1)
@@ -31,5 +42,6 @@ def harmonic_extension(mesh: CuspMesh, values: Floats) -> Floats:
     result = np.zeros((count, values.shape[1]))
     result[held] = values
     right = -stiffness[inside][:, held] @ values
-    result[inside] = spsolve(stiffness[inside][:, inside].tocsc(), right)
+    # spsolve drops the second axis of a single column
+    result[inside] = spsolve(stiffness[inside][:, inside].tocsc(), right).reshape(right.shape)
     return result

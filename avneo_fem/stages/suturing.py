@@ -2,9 +2,8 @@
 
 Order and reasons (design.md §3): bending is on from the first step and the state never crosses
 itself. ``boundary`` moves the sutured edge to its line in damped steps; ``hinged_edge`` takes the
-damping out (paper §3.2 step 3); ``clamped_edge`` turns the edge into its tangent half-plane (step
-4); ``contact_wedge`` closes the wedge, lambda = 0 ... 1, with the wall already present (§3.4 step
-2); ``root_wall`` raises eta_1 of wall and wedge until the cusp keeps its clearances (step 3);
+damping out, with the wall present (paper §3.2 step 3); ``clamped_edge`` turns the edge into its tangent half-plane (step
+4); ``contact_wedge`` closes the wedge, lambda = 0 ... 1 (§3.4 step 2); ``root_wall`` raises eta_1 of wall and wedge until the cusp keeps its clearances (step 3);
 ``equilibrium`` converges the result.
 """
 
@@ -20,7 +19,7 @@ from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
 from avneo_fem.equilibrium.directors import clamp_rotation, renew_directors, start_directors
 from avneo_fem.meshing.harmonic import harmonic_extension
 from avneo_fem.stages.checkpoint import Checkpoint, CheckpointStore
-from avneo_fem.stages.continuation import StageFailed, march
+from avneo_fem.stages.continuation import Attempt, StageFailed, march
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.record import CuspResult, Snapshot, StageRecord
 
@@ -113,9 +112,16 @@ class CuspSuturing:
         setup = self.setup
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         setup.wall.stiffness, setup.wedge.stiffness = checkpoint.penalty_stiffness
-        if setup.model.parameters.bending:
-            setup.model.set_directors(checkpoint.directors)
+        self._set_directors(checkpoint.directors)
         return checkpoint.state
+
+    def _directors(self) -> Floats:
+        model = self.setup.model
+        return model.directors if model.parameters.bending else np.empty((0, 3))
+
+    def _set_directors(self, directors: Floats) -> None:
+        if self.setup.model.parameters.bending:
+            self.setup.model.set_directors(directors)
 
     def _save(
         self,
@@ -128,11 +134,10 @@ class CuspSuturing:
         if self.store is None:
             return
         setup = self.setup
-        directors = setup.model.directors if setup.model.parameters.bending else np.empty((0, 3))
         stiffness = (setup.wall.stiffness, setup.wedge.stiffness)
         kept = Checkpoint(
             state=state,
-            directors=directors,
+            directors=self._directors(),
             levels_done=done,
             penalty_stiffness=stiffness,
             records=self.records,
@@ -162,10 +167,13 @@ class CuspSuturing:
     def _activate(self, name: str, parameter: float) -> None:
         """Terms and held angles that come with a level; they stay for all later ones."""
         setup = self.setup
-        if name == "clamped_edge":
+        if name == "hinged_edge":
+            # from here on the cusp must not slip behind its own sutured edge
+            setup.system.terms = [setup.wall]
+        elif name == "clamped_edge":
             setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
         elif name == "contact_wedge":
-            setup.system.terms = [setup.wedge, setup.wall]
+            setup.system.terms = [setup.wall, setup.wedge]
             setup.wedge.field = setup.wedges.wedge(setup.index, parameter)
         if name != "boundary":
             setup.model.pressure = setup.scene.diastolic_pressure
@@ -188,30 +196,18 @@ class CuspSuturing:
         if attempt is not None:
             smallest = self.options.smallest_step * step
             try:
-                state, steps = march(state, before, after, attempt, step, smallest, name)
+                safe = self._undoing(attempt)
+                state, steps = march(state, before, after, safe, step, smallest, name)
                 reason = reason or "converged: residual below tolerance"
             except StageFailed as error:
                 failure, state = error, error.state
                 reason, after, steps = str(error), error.parameter, error.steps
-                self._go_back(name, after)
         # a failed level is no place to go on from: it would be run again from its middle
         kept = done if failure is None else None
         self._keep(state, name, after, used, reason, clock, steps, kept)
         if failure is not None:
             raise failure
         return state
-
-    def _go_back(self, name: str, parameter: float) -> None:
-        """Undo what the failed attempt set, so that residual and fields are those of the state."""
-        setup = self.setup
-        if name == "boundary":
-            setup.model.pressure = self._pressure(parameter)
-        elif name == "contact_wedge":
-            setup.wedge.field = setup.wedges.wedge(setup.index, max(parameter, 0.0))
-
-    def _pressure(self, share: float) -> float:
-        """Pressure while the edge has gone this share of its way [kPa]."""
-        return self.setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, share)
 
     def _keep(
         self,
@@ -251,6 +247,24 @@ class CuspSuturing:
         }
 
     # -- attempts of one step --------------------------------------------------------------
+    def _undoing(self, attempt: Attempt) -> Attempt:
+        """The attempt, which takes back what it set in the model when it fails.
+
+        The angles of the state it started from are measured from the directors of then.
+        """
+        setup, model = self.setup, self.setup.model
+
+        def safe(state: Floats, start: float, stop: float) -> Outcome:
+            pressure, field = model.pressure, setup.wedge.field
+            directors = self._directors()
+            result, reason = attempt(state, start, stop)
+            if result is None:
+                model.pressure, setup.wedge.field = pressure, field
+                self._set_directors(directors)
+            return result, reason
+
+        return safe
+
     def _settle(self, state: Floats) -> Outcome:
         tolerance, budget = self.options.path_tolerance, self.options.maximum_iterations
         settled, verdict = self.setup.relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
@@ -271,7 +285,7 @@ class CuspSuturing:
         trial[model.position_dofs[line]] = setup.start[line] + stop * (
             setup.target - setup.start[line]
         )
-        model.pressure = self._pressure(stop)
+        model.pressure = setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, stop)
         return self._damped(trial)
 
     def _damped(self, trial: Floats) -> Outcome:
