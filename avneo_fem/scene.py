@@ -9,7 +9,7 @@ and ``scene_method`` (the tables), ``scene_schema`` (:class:`Scene`) and ``scene
 from __future__ import annotations
 
 from avneo_fem.scene_file import load_scene, parse_scene
-from avneo_fem.scene_method import Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
+from avneo_fem.scene_method import Clamp, Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
 from avneo_fem.scene_schema import FIDELITIES, Scene
 from avneo_fem.scene_tables import (
     Commissures,
@@ -23,6 +23,7 @@ from avneo_fem.scene_tables import (
 
 __all__ = [
     "FIDELITIES",
+    "Clamp",
     "Commissures",
     "Competence",
     "Contact",

@@ -13,6 +13,7 @@ from pydantic import Field
 from avneo_fem.scene_tables import Finite, NonNegative, Positive, Table
 
 __all__ = [
+    "Clamp",
     "Contact",
     "FreeEdge",
     "Material",
@@ -54,6 +55,16 @@ class Contact(Table):
     maximum_stiffness: Positive = Field(4096.0, description="eta_1 is not raised beyond [kPa]")
 
 
+class Clamp(Table):
+    """How firmly the sutured edge is held in its tangent half-plane (paper (3.1))."""
+
+    stiffness: Positive = Field(1e4, description="k at the start [mN]")
+    maximum_stiffness: Positive = Field(1e6, description="k is not raised beyond [mN]")
+    tolerance_degrees: Positive = Field(
+        5.0, description="rms angle between cusp and half-plane that is allowed [degrees]"
+    )
+
+
 class Wall(Table):
     """Contact with the wall of the root (paper §3.4 step 3, (1.5))."""
 
@@ -62,7 +73,9 @@ class Wall(Table):
         description="eta_1 at the start [kPa]; with Table 1's 8 kPa a coarse cusp can slip behind"
         " its own sutured edge before the wall stops it",
     )
-    width: Positive = Field(0.5, description="eta_2 [mm]")
+    width: Positive = Field(
+        0.1, description="eta_2 [mm]; Table 1's 0.5 mm would push the clamped edge off the wall"
+    )
     clearance: Finite | None = Field(
         None, description="d_0 of the mid-surface away from the suture [mm]; default H/2"
     )

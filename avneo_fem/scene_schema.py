@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from avneo_fem.scene_method import Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
+from avneo_fem.scene_method import Clamp, Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
 from avneo_fem.scene_tables import (
     Commissures,
     Competence,
@@ -44,6 +44,7 @@ class Scene(Table):
     free_edge: FreeEdge = Field(default_factory=FreeEdge)
     contact: Contact = Field(default_factory=Contact)
     wall: Wall = Field(default_factory=Wall)
+    clamp: Clamp = Field(default_factory=Clamp)
     mesh: Mesh = Field(default_factory=Mesh)
     placement: Placement = Field(default_factory=Placement)
     solver: Solver = Field(default_factory=Solver)

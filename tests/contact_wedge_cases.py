@@ -56,12 +56,12 @@ EXPERIMENTS = {
 
 
 def inputs(number):
-    """Arguments of ContactWedgeFamily for an experiment."""
+    """A_i (3, 3), C (3,) and c (3,) of an experiment."""
     ratio, lengths, _ = EXPERIMENTS[number]
     ends = commissures(ratio)
     flat = np.hstack([ends, np.zeros((3, 1))])
     centre = np.append(triple_point(ends, lengths), 0.0)
-    return flat, centre, np.array([0.0, 0.0, 1.0]), np.array(lengths)
+    return flat, centre, np.array(lengths)
 
 
 def bezier(polygon, t):

@@ -1,21 +1,20 @@
-"""Commissures, their plane and contact lengths against geometry (paper sections 3.1 and 3.3)."""
+"""Angles of the commissures and contact lengths against geometry (paper sections 3.1 and 3.3)."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from commissure_cases import random_triangles
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.commissure import (
-    CommissurePlane,
     angles_of_sides,
     commissure_angles,
     commissure_directions,
     contact_lengths,
 )
+from avneo_fem.geometry.commissure_plane import CommissurePlane
 
 
 @settings(deadline=None)
@@ -64,31 +63,6 @@ def test_chords_that_form_no_triangle(ratio: tuple[float, float, float]) -> None
     with pytest.raises(SceneError, match="form a triangle") as caught:
         commissure_angles(ratio)
     assert caught.value.key == "commissures.chord_ratio"
-
-
-def test_plane_coordinates() -> None:
-    """Truth: equidistant centre, orthonormal right-handed basis, round trip, extended sine rule."""
-    for points in random_triangles(50, 3):
-        plane = CommissurePlane(points)
-        to_centre = np.linalg.norm(points - plane.centre, axis=1)
-        assert to_centre == pytest.approx([plane.circumradius] * 3, rel=1e-9)
-        frame = np.vstack([plane.basis, plane.normal])
-        assert np.abs(frame @ frame.T - np.eye(3)).max() < 1e-13
-        assert np.linalg.det(frame) == pytest.approx(1.0, rel=1e-13)
-        flat = plane.to_plane(points)
-        assert flat[0].tolist() == [0.0, 0.0]
-        assert flat[2, 1] > 0.0
-        assert np.abs(plane.from_plane(flat) - points).max() < 1e-12
-        lifted = plane.to_plane(points + 3.0 * plane.normal)
-        assert np.abs(lifted - flat).max() < 1e-12
-        ratio = plane.chord_lengths / np.sin(commissure_angles(plane.chord_lengths))
-        assert ratio == pytest.approx([2.0 * plane.circumradius] * 3, rel=1e-9)
-
-
-def test_plane_needs_a_triangle() -> None:
-    """Truth: three points on a line span no plane."""
-    with pytest.raises(SceneError, match="not on a line"):
-        CommissurePlane(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [3.0, 3.0, 0.0]]))
 
 
 @settings(deadline=None)

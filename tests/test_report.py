@@ -134,7 +134,7 @@ def test_report_says_what_it_was_given() -> None:
 
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_the_scene_can_be_run_again(number: int) -> None:
-    """Truth: the whole resolved scene is in the report: read back from JSON it is the same scene."""
+    """Truth: the whole resolved scene is in the report: read back from JSON it is the same."""
     given = demo(number)
     data = json.loads(to_json(report(given, [])))["scene"]
     assert data["name"] == f"experiment-{number}"

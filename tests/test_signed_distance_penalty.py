@@ -37,9 +37,8 @@ def cylinder() -> SignedDistance:
 def wedge_field() -> SignedDistance:
     """Contact wedge of cusp 1 of Experiment 3 at lambda = 0.6."""
     valve = experiment(3, "code")
-    plane = valve.commissures
     family = ContactWedgeFamily(
-        plane.points, valve.triple_contact.point, plane.normal, valve.contact_lengths
+        valve.commissures, valve.triple_contact.point, valve.contact_lengths
     )
     return family.wedge(1, 0.6)
 

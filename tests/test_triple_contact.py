@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from commissure_cases import random_triangles, sides
 
-from avneo_fem.geometry.commissure import CommissurePlane, contact_lengths, quasi_optimal_lengths
+from avneo_fem.geometry.commissure import contact_lengths, quasi_optimal_lengths
+from avneo_fem.geometry.commissure_plane import CommissurePlane
 from avneo_fem.geometry.triple_contact import triple_contact_point, triple_contact_points
 
 Batch = tuple[np.ndarray, np.ndarray]
@@ -112,7 +113,7 @@ def test_remark_3_1() -> None:
     assert np.array_equal(side[obtuse], longest[obtuse])
     for i in np.flatnonzero(~obtuse)[:300]:
         plane = CommissurePlane(commissures[i])
-        assert point[i] == pytest.approx(plane.centre, abs=1e-9)
+        assert point[i] == pytest.approx(plane.origin, abs=1e-9)
         assert nu[i] == pytest.approx(plane.circumradius / 2.5, rel=1e-10)
 
 

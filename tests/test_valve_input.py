@@ -35,16 +35,16 @@ def test_omega_is_the_scenes() -> None:
     default = ValveInput.from_scene(parse_scene({}))
     other = ValveInput.from_scene(parse_scene({"contact": {"omega": 0.3}}))
     assert other.wedges.omega == 0.3
-    assert np.abs(other.wedges.sigma - default.wedges.sigma).max() > 0.05
+    assert np.abs(other.wedges.sigma - default.wedges.sigma).min() > 1e-3
 
 
 def test_wedges_that_cross_are_found_at_once() -> None:
-    """Truth: the two contact curves of cusp 0 of this valve cross about half way, which no cusp
-    could be in; `avneo check` has to say so, not a run after minutes."""
-    lengths = (22.21130836, 30.30814988, 16.44373222)
+    """Truth: half way the two contact curves of cusp 0 of this valve cross, which leaves no room
+    for it; `avneo check` has to say so, not a run after minutes."""
+    sizes = ((33.5, 15.05), (38.84, 17.45), (51.56, 20.57))
     scene = {
-        "commissures": {"chord_ratio": [7.2, 7.6, 8.7]},
-        "cusp": [{"template": {"free_edge_length": x, "belly_radius": 0.42 * x}} for x in lengths],
+        "commissures": {"chord_ratio": [5.32, 4.7, 8.85]},
+        "cusp": [{"template": {"free_edge_length": x, "belly_radius": r}} for x, r in sizes],
     }
     with pytest.raises(SceneError, match=r"free_edge_length = .* cross each other at lambda"):
         ValveInput.from_scene(parse_scene(scene))
@@ -89,12 +89,15 @@ def scenes(draw: Any) -> dict[str, Any]:
 def test_anything_is_either_built_or_a_scene_error(data: dict[str, Any]) -> None:
     """Truth: no other exception and no warning for any scene that the schema allows; what is built
     is finite and has a wedge for every lambda of the run."""
+    built: ValveInput | SceneError
     try:
         built = ValveInput.from_scene(parse_scene(data))
     except SceneError as error:
-        assert error.key
-        assert error.valid
-        assert "\n" not in str(error)
+        built = error
+    if isinstance(built, SceneError):
+        assert built.key
+        assert built.valid
+        assert "\n" not in str(built)
         return
     assert np.isfinite(built.geometry.triple_contact.point).all()
     assert np.isfinite(built.wedges.sigma).all()

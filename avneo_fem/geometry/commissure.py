@@ -1,4 +1,4 @@
-"""Commissures, their plane and the lengths of the contact curves (paper sections 3.1 and 3.3).
+"""Angles of the commissures and lengths of the contact curves (paper sections 3.1 and 3.3).
 
 Throughout, (i, j, k) is a positive permutation of (0, 1, 2): j = i + 1, k = i + 2 modulo 3.
 """
@@ -6,8 +6,6 @@ Throughout, (i, j, k) is a positive permutation of (0, 1, 2): j = i + 1, k = i +
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from avneo_fem.errors import SceneError
 
 __all__ = [
-    "CommissurePlane",
     "angles_of_sides",
     "commissure_angles",
     "commissure_directions",
@@ -69,84 +66,6 @@ def commissure_directions(alpha: ArrayLike) -> Array:
     """
     angle = np.asarray(alpha, dtype=float)
     return np.array([0.0, 2.0 * angle[2], 2.0 * (angle[2] + angle[0])])
-
-
-@dataclass(frozen=True, eq=False)
-class CommissurePlane:
-    """Plane of the commissures A_0, A_1, A_2 (paper section 3.1).
-
-    Parameters
-    ----------
-    points : (3, 3) array_like
-        A_i row by row [mm].
-
-    Attributes
-    ----------
-    origin : (3,) float64
-        A_0 [mm], origin of the plane's coordinates.
-    normal : (3,) float64
-        n = (A_1 - A_0) x (A_2 - A_0), normalised; towards the aorta.
-    basis : (2, 3) float64
-        Orthonormal rows e_0 (towards A_1) and e_1 = n x e_0.
-    chord_lengths : (3,) float64
-        a_i = |A_j A_k| [mm].
-    circumradius, centre : float and (3,) float64
-        R and centre of the circle through the commissures [mm].
-
-    Raises
-    ------
-    SceneError
-        When the points lie on a line.
-    """
-
-    points: Array
-
-    def __post_init__(self) -> None:
-        points = np.array(self.points, dtype=float)
-        points.flags.writeable = False
-        object.__setattr__(self, "points", points)
-        a = self.chord_lengths
-        if not np.linalg.norm(self._area_vector) > 1e-12 * a.max() ** 2:
-            raise SceneError("commissures", points.tolist(), "must be three points not on a line")
-
-    @cached_property
-    def _area_vector(self) -> Array:
-        return np.cross(self.points[1] - self.points[0], self.points[2] - self.points[0])
-
-    @cached_property
-    def origin(self) -> Array:
-        return self.points[0]
-
-    @cached_property
-    def normal(self) -> Array:
-        return np.asarray(self._area_vector / np.linalg.norm(self._area_vector))
-
-    @cached_property
-    def basis(self) -> Array:
-        first = (self.points[1] - self.points[0]) / self.chord_lengths[2]
-        return np.array([first, np.cross(self.normal, first)])
-
-    @cached_property
-    def chord_lengths(self) -> Array:
-        return np.asarray(np.linalg.norm(self.points[_J] - self.points[_K], axis=1))
-
-    @cached_property
-    def circumradius(self) -> float:
-        return float(self.chord_lengths.prod() / (2.0 * np.linalg.norm(self._area_vector)))
-
-    @cached_property
-    def centre(self) -> Array:
-        square = self.chord_lengths**2
-        weights = square * (square[_J] + square[_K] - square)  # barycentric coordinates
-        return np.asarray(weights @ self.points / weights.sum())
-
-    def to_plane(self, points: Array) -> Array:
-        """Coordinates (n, 2) [mm] in ``basis`` of the projections of points (n, 3) [mm]."""
-        return np.asarray((points - self.origin) @ self.basis.T)
-
-    def from_plane(self, points: Array) -> Array:
-        """Points (n, 3) [mm] of the plane with coordinates (n, 2) [mm] in ``basis``."""
-        return np.asarray(self.origin + points @ self.basis)
 
 
 def contact_lengths(commissure_lengths: ArrayLike, key: str = "cusp") -> Array:

@@ -1,8 +1,8 @@
-"""Coordinates in the plane of the three commissures (paper §3.3)."""
+"""The plane of the three commissures and coordinates in it (paper sections 3.1 and 3.3)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,56 +16,70 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class CommissurePlane:
-    """Plane M: origin in the circumcentre of A_0 A_1 A_2, first axis towards A_0.
+    """Plane M of the commissures: origin in their circumcentre, first axis towards A_0.
 
     Parameters
     ----------
-    origin : (3,) array
-        Circumcentre [mm].
-    basis : (3, 2) array
+    points : (3, 3) array_like
+        A_i row by row [mm], counter-clockwise seen from the aorta.
+
+    Attributes
+    ----------
+    normal : (3,) float64
+        n = (A_1 - A_0) x (A_2 - A_0), normalised; towards the aorta.
+    origin : (3,) float64
+        Circumcentre of A_0 A_1 A_2 [mm].
+    basis : (3, 2) float64
         Orthonormal axes as columns; the second is the first turned by +90 degrees about n.
     circumradius : float
         R of (3.3) [mm].
+    chord_lengths : (3,) float64
+        a_i = |A_j A_k| [mm].
+
+    Raises
+    ------
+    SceneError
+        When the points are not three finite points, or lie on a line.
     """
 
-    origin: Array
-    basis: Array
-    circumradius: float
+    points: Array
+    normal: Array = field(init=False, repr=False)
+    origin: Array = field(init=False, repr=False)
+    basis: Array = field(init=False, repr=False)
+    circumradius: float = field(init=False, repr=False)
+    chord_lengths: Array = field(init=False, repr=False)
 
-    @classmethod
-    def from_commissures(cls, commissures: Array, normal: Array) -> CommissurePlane:
-        """Plane through A_i (3, 3) with normal n (3,), about which they go counter-clockwise.
-
-        Raises
-        ------
-        SceneError
-            When the A_i lie on a line, or n is not normal to their plane or points backwards.
-        """
-        to_second, to_third = commissures[1] - commissures[0], commissures[2] - commissures[0]
-        cross = np.cross(to_second, to_third)
-        area, length = float(np.linalg.norm(cross)), float(np.linalg.norm(normal))
+    def __post_init__(self) -> None:
+        points = np.array(self.points, dtype=float)
+        if points.shape != (3, 3) or not np.isfinite(points).all():
+            raise SceneError("commissures", points.tolist(), "must be finite, of shape (3, 3)")
+        to_second, to_third = points[1] - points[0], points[2] - points[0]
         squares = to_second @ to_second, to_third @ to_third
-        if area <= 1e-9 * max(squares):
-            raise SceneError("commissures", commissures.tolist(), "must not lie on a line")
-        # compared as vectors: a cosine would let an angle of 1e-5 pass unseen
-        if length == 0.0 or np.abs(cross / area - normal / length).max() > 1e-7:
-            raise SceneError(
-                "normal",
-                normal.tolist(),
-                "must be normal to the plane of the commissures and see them counter-clockwise",
-            )
+        cross = np.cross(to_second, to_third)
+        area = float(np.linalg.norm(cross))
+        if not area > 1e-9 * max(squares):
+            raise SceneError("commissures", points.tolist(), "must be three points not on a line")
+        normal = cross / area
         to_centre = np.cross(squares[0] * to_third - squares[1] * to_second, cross)
         to_centre /= 2.0 * area**2
         radius = float(np.linalg.norm(to_centre))
         first = -to_centre / radius
-        # the plane's own normal, exact to rounding whatever the tolerance above lets pass
-        basis = np.stack([first, np.cross(cross / area, first)], axis=1)
-        return cls(commissures[0] + to_centre, basis, radius)
+        object.__setattr__(self, "circumradius", radius)
+        arrays = {
+            "points": points,
+            "normal": normal,
+            "origin": points[0] + to_centre,
+            "basis": np.stack([first, np.cross(normal, first)], axis=1),
+            "chord_lengths": np.linalg.norm(points[[1, 2, 0]] - points[[2, 0, 1]], axis=1),
+        }
+        for name, value in arrays.items():
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
 
     def project(self, points: Array) -> Array:
-        """Plane coordinates (..., 2) of points (..., 3)."""
+        """Plane coordinates (..., 2) [mm] of the projections of points (..., 3) [mm]."""
         return (points - self.origin) @ self.basis
 
     def embed(self, points: Array) -> Array:
-        """Points (..., 3) in space of plane coordinates (..., 2)."""
+        """Points (..., 3) [mm] in space of plane coordinates (..., 2) [mm]."""
         return self.origin + points @ self.basis.T

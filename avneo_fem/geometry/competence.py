@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from avneo_fem.geometry.commissure import CommissurePlane
+from avneo_fem.geometry.commissure_plane import CommissurePlane
 from avneo_fem.geometry.triple_contact import TripleContactPoint
 from avneo_fem.scene import Competence
 

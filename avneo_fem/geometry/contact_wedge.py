@@ -31,12 +31,10 @@ class ContactWedgeFamily:
 
     Parameters
     ----------
-    commissures : (3, 3) array
-        A_i [mm], counter-clockwise about the normal.
+    commissures : CommissurePlane
+        Points A_i, plane coordinates and the circumradius R.
     triple_contact_point : (3,) array
         C [mm], in the triangle of the commissures (a side of it included).
-    normal : (3,) array
-        n, normal to the plane of the commissures, in the direction of flow; any length.
     contact_lengths : (3,) array
         c_i [mm], length of the contact curve from A_i to C.
     omega : float
@@ -46,8 +44,6 @@ class ContactWedgeFamily:
     ----------
     sigma : (3,) array
         sigma* of (3.3c), matched to c_i (design.md §1).
-    frame : CommissurePlane
-        Plane coordinates and the circumradius R.
 
     Raises
     ------
@@ -55,23 +51,20 @@ class ContactWedgeFamily:
         When the points do not lie as said, or no curve has the length c_i.
     """
 
-    commissures: Array
+    commissures: CommissurePlane
     triple_contact_point: Array
-    normal: Array
     contact_lengths: Array
     omega: float = 0.5
     sigma: Array = field(init=False)
-    frame: CommissurePlane = field(init=False, repr=False)
     _ends: Array = field(init=False, repr=False)
     _polygons: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         keep = object.__setattr__
-        shapes = {"commissures": (3, 3), "triple_contact_point": (3,), "normal": (3,)}
-        for name, shape in {**shapes, "contact_lengths": (3,)}.items():
+        for name in ("triple_contact_point", "contact_lengths"):
             value = np.array(getattr(self, name), dtype=float)
-            if value.shape != shape or not np.isfinite(value).all():
-                raise SceneError(name, value.tolist(), f"must be finite, of shape {shape}")
+            if value.shape != (3,) or not np.isfinite(value).all():
+                raise SceneError(name, value.tolist(), "must be finite, of shape (3,)")
             value.flags.writeable = False
             keep(self, name, value)
         if not (np.isfinite(self.omega) and self.omega > 0.0):
@@ -83,15 +76,14 @@ class ContactWedgeFamily:
                 "contact lengths c_i = (l_j + l_k - l_i) / 2 must be greater than 0: each free "
                 "edge must be shorter than the other two together",
             )
-        frame = CommissurePlane.from_commissures(self.commissures, self.normal)
-        keep(self, "frame", frame)
-        keep(self, "_ends", frame.project(self.commissures))
-        centre = frame.project(self.triple_contact_point)
+        plane = self.commissures
+        keep(self, "_ends", plane.project(plane.points))
+        centre = plane.project(self.triple_contact_point)
         self._check_centre(centre)
         sigma, polygons = np.zeros(3), np.zeros((3, 4, 2))
         for i in range(3):
             end, neighbour = self._ends[i], self._ends[(i + 1) % 3]
-            deflection = deflection_point(centre, end, neighbour, frame.circumradius)
+            deflection = deflection_point(centre, end, neighbour, plane.circumradius)
             length = float(self.contact_lengths[i])
             sigma[i] = match_length(centre, end, deflection, length, self.omega)
             polygons[i] = control_points(centre, end, deflection, sigma[i], self.omega)
@@ -101,8 +93,8 @@ class ContactWedgeFamily:
 
     def _check_centre(self, centre: Array) -> None:
         weights = np.linalg.solve(np.vstack([self._ends.T, np.ones(3)]), np.r_[centre, 1.0])
-        off = np.linalg.norm(self.frame.embed(centre) - self.triple_contact_point)
-        tolerance = 1e-9 * self.frame.circumradius
+        off = np.linalg.norm(self.commissures.embed(centre) - self.triple_contact_point)
+        tolerance = 1e-9 * self.commissures.circumradius
         if weights.min() < -1e-9 or weights.max() > 1.0 - 1e-9 or off > tolerance:
             raise SceneError(
                 "triple_contact_point",
@@ -138,4 +130,4 @@ class ContactWedgeFamily:
                 f"the contact curves of cusp {cusp_index} cross each other at lambda = {lam:g}; "
                 "use cusps of less unequal free edges",
             )
-        return ContactWedge(section, self.frame, cusp_index, float(lam))
+        return ContactWedge(section, self.commissures, cusp_index, float(lam))

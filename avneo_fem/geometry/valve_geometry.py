@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.commissure import (
-    CommissurePlane,
     commissure_angles,
     commissure_directions,
     contact_lengths,
 )
+from avneo_fem.geometry.commissure_plane import CommissurePlane
 from avneo_fem.geometry.competence import competence_verdict
 from avneo_fem.geometry.root import CylinderRoot
 from avneo_fem.geometry.stitching import StitchingMap

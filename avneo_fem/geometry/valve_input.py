@@ -40,9 +40,8 @@ class ValveInput:
         """
         geometry = ValveGeometry.from_scene(scene)
         wedges = ContactWedgeFamily(
-            geometry.commissures.points,
+            geometry.commissures,
             geometry.triple_contact.point,
-            geometry.commissures.normal,
             geometry.contact_lengths,
             scene.contact.omega,
         )

@@ -70,6 +70,7 @@ def tolerances_of(scene: Scene, geometry: ValveGeometry) -> Tolerances:
     return Tolerances(
         residual=scene.solver.tolerance,
         inside_mm=scene.solver.inside_tolerance,
+        clamp_deg=scene.clamp.tolerance_degrees if scene.material.bending else np.inf,
         cusp_distance_mm=min(wedge, float(edges_apart)),
         wall_distance_mm=max(
             halves[0] if scene.wall.clearance is None else scene.wall.clearance, 0.0

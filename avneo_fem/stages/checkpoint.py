@@ -31,7 +31,7 @@ class Checkpoint:
     state: Floats
     directors: Floats
     levels_done: int
-    penalty_stiffness: tuple[float, float]
+    penalty_stiffness: tuple[float, float, float]
     records: list[StageRecord]
     snapshots: list[Snapshot]
     finished: bool = False

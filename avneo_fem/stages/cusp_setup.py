@@ -7,6 +7,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from avneo_fem.constraints.clamp_penalty import ClampPenalty
 from avneo_fem.constraints.self_contact import SelfContact
 from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
 from avneo_fem.equilibrium.cusp_system import CuspSystem
@@ -80,6 +81,7 @@ class CuspSetup:
         middles = (mesh.suture_arc_length[1:] + mesh.suture_arc_length[:-1]) / 2
         self.conormal = self.cusp.sutured_conormal(middles)
         self.wall, self.wedge = self._penalties()
+        self.clamp = self._clamp()
         membrane = scene.material.young_modulus * self.cusp.thickness
         self.contact = self._self_contact(membrane)
         self.system = CuspSystem(self.model, self.contact)
@@ -134,6 +136,16 @@ class CuspSetup:
             from_wedge,
         )
         return wall, wedge
+
+    def _clamp(self) -> ClampPenalty:
+        """Holds the triangles at the suture; acts from the stage ``clamped_edge`` on."""
+        mesh = self.mesh
+        ends = np.c_[mesh.suture_line[:-1], mesh.suture_line[1:]]
+        corners = mesh.triangles[mesh.edge_cells[mesh.suture_edges, 0]]
+        apex = corners[~(corners[:, :, None] == ends[:, None, :]).any(axis=2)]
+        sides = np.stack([self.target[:-1], self.target[1:]], axis=1)
+        lengths = np.linalg.norm(mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]], axis=1)
+        return ClampPenalty(len(mesh.points), apex, sides, self.conormal, lengths)
 
     def _self_contact(self, membrane: float) -> SelfContact:
         options = self.scene.solver

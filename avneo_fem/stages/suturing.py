@@ -1,9 +1,10 @@
 """All stages of one cusp, from the flat template to its place in the root.
 
 Order and reasons (design.md §3): bending is on from the first step and the state never crosses
-itself. ``boundary`` moves the sutured edge to its line in damped steps; ``hinged_edge`` takes the
-damping out, with the wall present (paper §3.2 step 3); ``clamped_edge`` turns the edge into its tangent half-plane (step
-4); ``contact_wedge`` closes the wedge, lambda = 0 ... 1 (§3.4 step 2); ``root_wall`` raises eta_1 of wall and wedge until the cusp keeps its clearances (step 3);
+itself. ``boundary`` moves the sutured edge to its line in damped steps. ``hinged_edge`` takes the
+damping out, with the wall present (paper §3.2 step 3). ``clamped_edge`` turns the edge into its
+tangent half-plane (step 4). ``contact_wedge`` closes the wedge, lambda = 0 ... 1 (§3.4 step 2).
+``root_wall`` raises the penalties of wall, wedge and clamp until each holds (step 3).
 ``equilibrium`` converges the result.
 """
 
@@ -73,7 +74,6 @@ class CuspSuturing:
             state, failure = self._run_from(state, done)
             residual = setup.system.relative_residual(state)
             self._save(state, done, True, residual, failure)
-        self.final_state = state
         return CuspResult(
             index=setup.index,
             mesh=setup.mesh,
@@ -91,8 +91,10 @@ class CuspSuturing:
         """All levels after the first ``done``; last good state, and what failed if anything did."""
         try:
             for number, (name, before, after) in enumerate(self._levels()):
-                self._activate(name, after)
-                if number >= done:
+                if number < done:
+                    self._activate(name, after)
+                else:
+                    self._activate(name, before)
                     state = self._level(state, name, before, after, number + 1)
             return self._raise_until_inside(state), None
         except StageFailed as error:
@@ -111,7 +113,8 @@ class CuspSuturing:
         """Take over what a checkpoint holds; its state."""
         setup = self.setup
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
-        setup.wall.stiffness, setup.wedge.stiffness = checkpoint.penalty_stiffness
+        stiffness = checkpoint.penalty_stiffness
+        setup.wall.stiffness, setup.wedge.stiffness, setup.clamp.stiffness = stiffness
         self._set_directors(checkpoint.directors)
         return checkpoint.state
 
@@ -160,21 +163,26 @@ class CuspSuturing:
             count = scene.solver.clamp_steps
             levels += [("clamped_edge", k / count, (k + 1) / count) for k in range(count)]
         count = scene.contact.steps
-        # lambda = 0 is a level of its own: there wedge and wall appear
+        # lambda = 0 is a level of its own: there the wedge appears
         levels += [("contact_wedge", (k - 1) / count, k / count) for k in range(count + 1)]
         return levels
 
     def _activate(self, name: str, parameter: float) -> None:
-        """Terms and held angles that come with a level; they stay for all later ones."""
+        """Terms and held angles that come with a level; they stay for all later ones.
+
+        ``parameter`` is where the level starts, or its end when it is behind the state.
+        """
         setup = self.setup
         if name == "hinged_edge":
             # from here on the cusp must not slip behind its own sutured edge
             setup.system.terms = [setup.wall]
         elif name == "clamped_edge":
             setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
+            setup.system.terms = [setup.wall, setup.clamp]
         elif name == "contact_wedge":
-            setup.system.terms = [setup.wall, setup.wedge]
-            setup.wedge.field = setup.wedges.wedge(setup.index, parameter)
+            clamp = [setup.clamp] if setup.scene.material.bending else []
+            setup.system.terms = [setup.wall, *clamp, setup.wedge]
+            setup.wedge.field = setup.wedges.wedge(setup.index, max(parameter, 0.0))
         if name != "boundary":
             setup.model.pressure = setup.scene.diastolic_pressure
 
@@ -267,6 +275,7 @@ class CuspSuturing:
 
     def _settle(self, state: Floats) -> Outcome:
         tolerance, budget = self.options.path_tolerance, self.options.maximum_iterations
+        self.setup.clamp.renew(self.setup.system.positions(state))
         settled, verdict = self.setup.relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
         return (settled if verdict.converged else None), (
             f"{verdict.reason}, residual {verdict.residual:.1e}"
@@ -297,12 +306,17 @@ class CuspSuturing:
         return self._settle(state)
 
     def _turn_edge(self, state: Floats, start: float, stop: float) -> Outcome:
-        """Turn the suture edges by their share of what is missing to the tangent half-plane."""
+        """Turn the suture edges by their share of what is missing to the tangent half-plane.
+
+        The penalty that takes the triangles along grows with it, by a factor of 4 a level.
+        """
         setup, model = self.setup, self.setup.model
         state = renew_directors(model, state)
         rest = clamp_rotation(model, state, setup.conormal)
         trial = state.copy()
         trial[model.angle_dofs[setup.mesh.suture_edges]] += (stop - start) / (1.0 - start) * rest
+        full, count = setup.scene.clamp.stiffness, self.options.clamp_steps
+        setup.clamp.stiffness = full * 4.0 ** (count * (stop - 1.0))
         return self._settle(trial)
 
     def _close_wedge(self, state: Floats, _start: float, stop: float) -> Outcome:
@@ -310,48 +324,75 @@ class CuspSuturing:
         return self._settle(state)
 
     # -- last stages -----------------------------------------------------------------------
-    def shortfalls(self, points: Floats) -> tuple[float, float]:
-        """Largest miss of the clearances from wall and wedge, sutured nodes apart [mm]."""
+    def shortfalls(self, points: Floats) -> tuple[float, float, float]:
+        """How far wall, wedge and clamp are from what they must hold.
+
+        Returns
+        -------
+        (wall, wedge, clamp)
+            Largest miss of the clearances [mm], sutured nodes apart; within the taper the node
+            need only be inside the root. Clamp: rms angle to the half-plane [degrees].
+        """
+        setup = self.setup
         free = np.ones(len(points), dtype=bool)
-        free[self.setup.mesh.suture_line] = False
-        terms = (self.setup.wall, self.setup.wedge)
-        wall, wedge = (float(term.shortfall(points)[free].max()) for term in terms)
-        return wall, wedge
+        free[setup.mesh.suture_line] = False
+        distance = setup.wall.evaluate(points)[0]
+        tapered = setup.wall.clearance < setup.wall.clearance.max()
+        wall = np.where(tapered, -distance, setup.wall.clearance - distance)
+        wedge = setup.wedge.shortfall(points)
+        clamp = setup.clamp.rms_angle(points) if setup.scene.material.bending else 0.0
+        return (
+            float(wall[free].max(initial=0.0)),
+            float(wedge[free].max(initial=0.0)),
+            float(np.degrees(clamp)),
+        )
 
     def _raise_until_inside(self, state: Floats) -> Floats:
-        """Raise eta_1 of wall and wedge until the clearances hold, then converge (§3.4 step 3)."""
+        """Raise the penalties until clearances and clamp hold, then converge (§3.4 step 3)."""
         setup, scene = self.setup, self.setup.scene
-        limits = (scene.wall.maximum_stiffness, scene.contact.maximum_stiffness)
+        inside = self.options.inside_tolerance
+        allowed = (inside, inside, scene.clamp.tolerance_degrees)
+        terms = (setup.wall, setup.wedge, setup.clamp)
+        limits = (
+            scene.wall.maximum_stiffness,
+            scene.contact.maximum_stiffness,
+            scene.clamp.maximum_stiffness,
+        )
         while True:
             misses = self.shortfalls(setup.system.positions(state))
-            late = [miss > self.options.inside_tolerance for miss in misses]
+            late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
             if not any(late):
                 state = self._converge(state, "equilibrium", self.options.tolerance)
                 misses = self.shortfalls(setup.system.positions(state))
-                if max(misses) <= self.options.inside_tolerance:
+                if all(miss <= most for miss, most in zip(misses, allowed, strict=True)):
                     return state
                 continue
             raised = False
-            for term, limit, behind in zip((setup.wall, setup.wedge), limits, late, strict=True):
+            for term, limit, behind in zip(terms, limits, late, strict=True):
                 if behind and term.stiffness < limit:
                     term.stiffness = min(limit, scene.wall.growth * term.stiffness)
                     raised = True
             if not raised:
                 state = self._converge(state, "equilibrium", self.options.tolerance)
-                wall, wedge = setup.wall.stiffness, setup.wedge.stiffness
-                message = (
-                    f"root_wall: {misses[0]:.3f} mm short of the clearance from the wall and"
-                    f" {misses[1]:.3f} mm from the contact wedge at eta_1 = {wall:g}"
-                    f" and {wedge:g} kPa; raise wall.maximum_stiffness,"
-                    " contact.maximum_stiffness or solver.inside_tolerance"
-                )
-                raise StageFailed(message, state, setup.wall.stiffness, 0)
+                raise StageFailed(self._what_is_missing(state), state, setup.wall.stiffness, 0)
             state = self._converge(state, "root_wall", self.options.path_tolerance)
+
+    def _what_is_missing(self, state: Floats) -> str:
+        setup = self.setup
+        wall, wedge, clamp = self.shortfalls(setup.system.positions(state))
+        return (
+            f"root_wall: short of the clearance by {wall:.3f} mm from the wall and {wedge:.3f} mm"
+            f" from the contact wedge, clamp off by {clamp:.1f} degrees rms, at penalties of"
+            f" {setup.wall.stiffness:g} kPa, {setup.wedge.stiffness:g} kPa and"
+            f" {setup.clamp.stiffness:g} mN; refine mesh.size, or raise maximum_stiffness of wall,"
+            " contact or clamp, or the tolerance"
+        )
 
     def _converge(self, state: Floats, name: str, tolerance: float) -> Floats:
         clock, used = time.perf_counter(), self.setup.newton.iterations
         budget = 10 * self.options.maximum_iterations
         relaxation = self.setup.relaxation
+        self.setup.clamp.renew(self.setup.system.positions(state))
         state, verdict = relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
         stiffness = self.setup.wall.stiffness
         self._keep(state, name, stiffness, used, verdict.reason, clock, 1, len(self._levels()))

@@ -1,0 +1,383 @@
+"""The stages of one cusp: their order, what holds after each, failure, and going on."""
+
+from __future__ import annotations
+
+import pickle
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from run_cases import FAILING, SMALL
+
+from avneo_fem.equilibrium.directors import clamp_rotation
+from avneo_fem.geometry.valve_input import ValveInput
+from avneo_fem.meshing.triangulate import triangulate_template
+from avneo_fem.results.crossings import self_intersections
+from avneo_fem.scene import parse_scene
+from avneo_fem.stages.checkpoint import Checkpoint, CheckpointStore
+from avneo_fem.stages.continuation import StageFailed
+from avneo_fem.stages.cusp_setup import CuspSetup
+from avneo_fem.stages.record import StageRecord
+from avneo_fem.stages.suturing import CuspSuturing
+
+LAMBDAS = [0.0, 0.25, 0.5, 0.75, 1.0]
+
+
+def set_up(text: str = SMALL, **tables: Any) -> CuspSetup:
+    """Cusp 1 of a scene, entries of single tables replaced."""
+    data = tomllib.loads(text)
+    for key, value in tables.items():
+        data[key] = {**data.get(key, {}), **value} if isinstance(value, dict) else value
+    given = ValveInput.from_scene(parse_scene(data))
+    mesh = triangulate_template(given.geometry.cusps[1].template, given.scene.mesh_size)
+    return CuspSetup(given.scene, given.geometry, given.wedges, 1, mesh)
+
+
+class Kept(CheckpointStore):
+    """A store that remembers every checkpoint as the bytes that were written."""
+
+    def __init__(self, folder: Path, setup: CuspSetup) -> None:
+        super().__init__(folder, setup.scene, "test")
+        self.files: list[bytes] = []
+
+    def save(self, index: int, checkpoint: Checkpoint) -> None:
+        super().save(index, checkpoint)
+        self.files.append(self.path(index).read_bytes())
+
+
+class Done:
+    """A run of cusp 1, with what the observer and the store saw."""
+
+    def __init__(self, setup: CuspSetup, folder: Path, resume: bool = False) -> None:
+        self.setup, self.store = setup, Kept(folder, setup)
+        self.seen: list[tuple[int, StageRecord]] = []
+        observer = lambda i, record: self.seen.append((i, record))  # noqa: E731
+        self.suturing = CuspSuturing(setup, observer, self.store)
+        self.resume = resume
+
+    def run(self) -> Done:
+        self.result = self.suturing.run(self.resume)
+        return self
+
+    @property
+    def names(self) -> list[str]:
+        return [record.name for record in self.result.records]
+
+
+def after(done: Done, level: int, folder: Path, setup: CuspSetup | None = None) -> Done:
+    """A new process (a set-up of its own) that goes on from the checkpoint of a level of ``done``.
+
+    With a ``setup`` of another scene that is the same up to there: its checkpoints are renamed.
+    """
+    again = Done(set_up() if setup is None else setup, folder, resume=True)
+    _, checkpoint = pickle.loads(done.store.files[level - 1])
+    again.store.folder.mkdir(parents=True, exist_ok=True)
+    again.store.path(1).write_bytes(pickle.dumps((again.store.key, checkpoint)))
+    return again
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    """The small scene."""
+    return Done(set_up(), tmp_path_factory.mktemp("done")).run()
+
+
+@pytest.fixture(scope="module")
+def failed(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    """The small scene with so few iterations that it fails."""
+    setup = set_up(solver={"maximum_iterations": 1})
+    return Done(setup, tmp_path_factory.mktemp("failed")).run()
+
+
+def test_order_of_the_stages(done: Done) -> None:
+    """Truth: paper §3.2 and §3.4, in the order of the module's docstring, with the levels that the
+    scene asks for; no failure; the observer saw the same records, in order."""
+    names, parameters = done.names, [record.parameter for record in done.result.records]
+    assert done.result.failure is None
+    assert names[:19] == (
+        ["placement"]
+        + ["boundary"] * 10
+        + ["hinged_edge"]
+        + ["clamped_edge"] * 2
+        + ["contact_wedge"] * 5
+    )
+    assert parameters[0] == done.setup.placement_k
+    np.testing.assert_allclose(parameters[1:11], np.arange(1, 11) / 10)
+    assert parameters[11:14] == [1.0, 0.5, 1.0]
+    assert parameters[14:19] == LAMBDAS
+    assert set(names[19:-1]) <= {"root_wall"}
+    assert names[-1] == "equilibrium"
+    assert done.seen == [(1, record) for record in done.result.records]
+    shots = done.result.snapshots
+    assert [(s.name, s.parameter) for s in shots] == list(zip(names, parameters, strict=True))
+
+
+def test_records(done: Done) -> None:
+    """Truth: every stage after the boundary is in equilibrium to its tolerance, the last to the
+    final one, computed anew from the last state; iterations and seconds are counted."""
+    scene = done.setup.scene
+    for record in done.result.records[11:]:
+        assert record.residual <= scene.solver.path_tolerance
+        assert record.reason == "converged: residual below tolerance"
+    assert done.result.residual <= scene.solver.tolerance
+    anew = done.setup.system.relative_residual(done.suturing.final_state)
+    assert done.result.residual == pytest.approx(anew, rel=1e-6)
+    assert done.result.records[0].iterations == 0
+    assert sum(r.iterations for r in done.result.records) == done.setup.newton.iterations > 50
+    assert all(r.seconds >= 0 and r.substeps >= 1 for r in done.result.records)
+    assert done.result.dofs == done.setup.model.size
+    seconds = sum(record.seconds for record in done.result.records)
+    assert seconds <= done.result.seconds
+
+
+def test_sutured_nodes(done: Done) -> None:
+    """Truth: in each boundary level they are that share of the straight way along; from its end on
+    exactly, to the last bit, at their targets."""
+    line, start, target = done.setup.mesh.suture_line, done.setup.start, done.setup.target
+    for shot in done.result.snapshots[1:11]:
+        way = start[line] + shot.parameter * (target - start[line])
+        np.testing.assert_allclose(shot.points[line], way, atol=1e-12)
+    for shot in done.result.snapshots[10:]:
+        assert np.abs(shot.points[line] - target).max() < 1e-13
+    np.testing.assert_array_equal(done.result.points, done.result.snapshots[-1].points)
+
+
+def test_never_crosses_itself(done: Done) -> None:
+    """Truth: an independent test finds no two triangles of the cusp that meet, after any level."""
+    for shot in done.result.snapshots:
+        assert self_intersections(shot.points, done.setup.mesh.triangles) == 0
+    moved = np.linalg.norm(done.result.points - done.setup.start, axis=1)
+    assert moved.max() > 5.0  # it did go somewhere
+
+
+def test_clamp(done: Done) -> None:
+    """Truth: the directors of the sutured edges end in the prescribed half-plane, although the
+    state went through all later stages."""
+    setup, state = done.setup, done.suturing.final_state
+    rest = clamp_rotation(setup.model, state, setup.conormal)
+    # the edge is clamped at its position of then: it did not move since
+    np.testing.assert_allclose(rest, 0.0, atol=1e-9)
+
+
+def test_clearances(done: Done) -> None:
+    """Truth: by the signed distances themselves, no free node misses its clearance from wall or
+    wedge (lambda = 1) by more than the scene allows."""
+    setup, points = done.setup, done.result.points
+    free = np.setdiff1d(np.arange(len(points)), setup.mesh.suture_line)
+    s = setup.mesh.distance_to_suture[free]
+    wall = 12.0 - np.hypot(*points[free, :2].T) - 0.25 * np.minimum(1.0, s / 2.5) ** 2
+    wedge = setup.wedges.wedge(1, 1.0).evaluate(points[free])[0] - 0.25
+    assert wall.min() >= -0.3
+    assert wedge.min() >= -0.3
+    misses = done.suturing.shortfalls(points)
+    assert misses == pytest.approx((max(0.0, -wall.min()), max(0.0, -wedge.min())), abs=1e-12)
+
+
+def test_snapshot_fields(done: Done) -> None:
+    """Truth: the distances at the nodes by their formulas; the penalty pressure is that of (1.5),
+    eta_1 f(d) of wall and wedge, from the level where they appear."""
+    setup = done.setup
+    for shot in done.result.snapshots:
+        expected = 12.0 - np.hypot(*shot.points[:, :2].T)
+        np.testing.assert_allclose(shot.fields["wall_distance"], expected, atol=1e-12)
+    shot = done.result.snapshots[-1]
+    distance = setup.wedges.wedge(1, 1.0).evaluate(shot.points)[0]
+    np.testing.assert_allclose(shot.fields["wedge_distance"], distance, atol=1e-12)
+    wedge = setup.wedge.stiffness * np.maximum(1 - 2 * (distance - 0.25) / setup.wedge.width, 0)
+    to_wall = shot.fields["wall_distance"] - setup.wall.clearance
+    wall = setup.wall.stiffness * np.maximum(1 - 2 * to_wall / setup.wall.width, 0)
+    np.testing.assert_allclose(shot.fields["penalty_pressure"], wedge + wall, atol=1e-9)
+    assert shot.fields["penalty_pressure"].max() > 0
+    assert done.result.snapshots[10].fields["penalty_pressure"].max() == 0
+
+
+def test_clearances_out_of_reach(done: Done, tmp_path: Path) -> None:
+    """Truth: penalties that may not be raised cannot keep clearances to a micrometre: the run ends
+    in undamped equilibrium all the same, and says what is missing and what to change."""
+    run = after(done, 19, tmp_path, set_up(FAILING)).run()
+    assert run.result.failure is not None
+    assert run.result.failure.startswith("root_wall: ")
+    wall, wedge = run.suturing.shortfalls(run.result.points)
+    assert max(wall, wedge) > 0.001
+    for text in (
+        f"{wall:.3f} mm short of the clearance from the wall",
+        f"{wedge:.3f} mm from the contact wedge",
+        "eta_1 = 64 and 16 kPa",
+        "raise wall.maximum_stiffness, contact.maximum_stiffness or solver.inside_tolerance",
+    ):
+        assert text in run.result.failure
+    assert run.names[19:] == ["equilibrium"]  # nothing could be raised
+    assert run.result.residual <= 1e-8
+
+
+def test_stiffness_is_raised_as_said(done: Done, tmp_path: Path) -> None:
+    """Truth: eta_1 grows by ``growth`` from level to level until the clearances hold, and only of
+    what misses its own; the last equilibrium is reached with those values."""
+    tight = {"inside_tolerance": 0.01}
+    run = after(done, 19, tmp_path, set_up(solver=tight, wall={"growth": 3.0})).run()
+    raised = [record for record in run.result.records if record.name == "root_wall"]
+    assert run.result.failure is None
+    assert raised
+    assert max(run.suturing.shortfalls(run.result.points)) <= 0.01
+    stiffness = np.array([run.setup.wall.stiffness, run.setup.wedge.stiffness])
+    powers = np.log(stiffness / [64.0, 16.0]) / np.log(3.0)
+    np.testing.assert_allclose(powers, np.round(powers), atol=1e-9)
+    assert powers.max() == pytest.approx(len(raised))
+    assert run.names[-1] == "equilibrium"
+    assert run.result.records[-1].parameter == stiffness[0]
+
+
+def test_a_stage_fails(failed: Done) -> None:
+    """Truth: with one iteration a step nothing settles: the stage and its smallest step are in the
+    failure, the level is in the record with that reason, later stages are not run, and the state is
+    the last good one, free of crossings, its sutured nodes at their targets."""
+    assert failed.names[-1] == "hinged_edge"
+    last = failed.result.records[-1]
+    assert failed.result.failure == last.reason
+    assert last.reason.startswith("hinged_edge: stopped at 0 of 1; the smallest step, 0.00")
+    assert "iteration limit of 1 reached" in last.reason
+    assert last.parameter == 0.0
+    points = failed.result.points
+    for shot in failed.result.snapshots[-2:]:
+        np.testing.assert_array_equal(points, shot.points)
+    assert self_intersections(points, failed.setup.mesh.triangles) == 0
+    line = failed.setup.mesh.suture_line
+    assert np.abs(points[line] - failed.setup.target).max() < 1e-13
+    assert failed.result.residual == pytest.approx(last.residual)
+    assert len(failed.seen) == len(failed.result.records)
+
+
+def test_a_failed_attempt_is_taken_back(
+    done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Truth: attempts that fail after having moved directors and wedge leave no trace: a run in
+    which every first attempt of a level fails ends with the clamp in place."""
+    run = after(done, 12, tmp_path)
+    settle, tried = run.suturing._settle, set()
+
+    def second_time(state: np.ndarray) -> tuple[np.ndarray | None, str]:
+        settled, reason = settle(state)
+        level = len(run.suturing.records)
+        if level in tried:
+            return settled, reason
+        tried.add(level)
+        return None, "on purpose"
+
+    monkeypatch.setattr(run.suturing, "_settle", second_time)
+    run.run()
+    assert run.result.failure is None
+    assert [record.substeps for record in run.result.records[12:19]] == [2] * 7
+    rest = clamp_rotation(run.setup.model, run.suturing.final_state, run.setup.conormal)
+    np.testing.assert_allclose(rest, 0.0, atol=1e-9)
+
+
+def test_a_failed_level_keeps_what_belongs_to_its_state(
+    done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Truth: a level that fails for good has residual and distances of the state it is left with,
+    that of the level before."""
+    run = after(done, 16, tmp_path)
+    settle = run.suturing._settle
+    monkeypatch.setattr(run.suturing, "_settle", lambda state: (None, settle(state)[1]))
+    run.run()
+    assert run.result.failure is not None
+    assert run.result.failure.startswith("contact_wedge: stopped at 0.25 of 0.5;")
+    assert run.result.residual == pytest.approx(done.result.records[15].residual, rel=1e-6)
+    np.testing.assert_array_equal(run.result.points, done.result.snapshots[15].points)
+    last, before = run.result.snapshots[-1].fields, done.result.snapshots[15].fields
+    np.testing.assert_array_equal(last["wedge_distance"], before["wedge_distance"])
+
+
+def untimed(records: list[StageRecord]) -> list[tuple[Any, ...]]:
+    """All but the seconds and the last digits of the residual."""
+    return [(r.name, r.parameter, r.iterations, r.reason, r.substeps) for r in records]
+
+
+@pytest.mark.parametrize("level", [6, 12, 17, 19])
+def test_going_on(done: Done, tmp_path: Path, level: int) -> None:
+    """Truth: the uninterrupted run, wherever the process was killed: the same levels, none twice,
+    the same state after each to 1e-9 mm."""
+    again = after(done, level, tmp_path).run()
+    assert untimed(again.result.records) == untimed(done.result.records)
+    assert len(again.seen) == len(done.result.records) - level
+    np.testing.assert_allclose(again.result.points, done.result.points, atol=1e-9)
+    for shot, other in zip(again.result.snapshots, done.result.snapshots, strict=True):
+        assert (shot.name, shot.parameter) == (other.name, other.parameter)
+        np.testing.assert_allclose(shot.points, other.points, atol=1e-9)
+    assert again.result.failure is None
+    assert again.result.residual <= 1e-8
+
+
+def test_a_finished_cusp_is_not_run_again(done: Done, failed: Done, tmp_path: Path) -> None:
+    """Truth: nothing is left to do after its last checkpoint, be it good or failed: the same
+    result, no level run."""
+    for before, tables in ((done, {}), (failed, {"solver": {"maximum_iterations": 1}})):
+        folder = tmp_path / before.names[-1]
+        again = after(before, len(before.store.files), folder, set_up(**tables)).run()
+        assert again.seen == []
+        assert again.result.records == before.result.records
+        assert again.result.residual == before.result.residual
+        assert again.result.failure == before.result.failure
+        np.testing.assert_array_equal(again.result.points, before.result.points)
+
+
+def test_no_checkpoint_of_a_failed_level(failed: Done) -> None:
+    """Truth: it would be gone on from in its middle: after placement and ten boundary levels comes
+    that of the finished, failed cusp."""
+    kept = [pickle.loads(data)[1] for data in failed.store.files]
+    assert [c.levels_done for c in kept[:-1]] == list(range(1, 12))
+    assert [c.finished for c in kept] == [False] * 11 + [True]
+
+
+class Stop(BaseException):
+    """The end of a process."""
+
+
+@pytest.mark.parametrize("case", ["not asked", "another scene"])
+def test_checkpoints_that_are_not_used(done: Done, tmp_path: Path, case: str) -> None:
+    """Truth: a checkpoint is gone on from only when asked for, and only by its own scene: else the
+    first level run is the placement."""
+    other = case == "another scene"
+    setup = set_up(material={"young_modulus": 1000.5}) if other else set_up()
+    store = Kept(tmp_path, setup)
+    store.folder.mkdir(exist_ok=True)
+    store.path(1).write_bytes(done.store.files[11])
+    seen: list[str] = []
+
+    def observer(_index: int, record: StageRecord) -> None:
+        seen.append(record.name)
+        if len(seen) == 2:
+            raise Stop
+
+    with pytest.raises(Stop):
+        CuspSuturing(setup, observer, store).run(resume=other)
+    assert seen == ["placement", "boundary"]
+
+
+def test_without_bending(tmp_path: Path) -> None:
+    """Truth: a membrane has no edge to clamp: that stage is left out; its checkpoints have no
+    directors; it starts on the boundary path all the same."""
+    setup = set_up(material={"bending": False})
+    store = Kept(tmp_path, setup)
+
+    def observer(_index: int, record: StageRecord) -> None:
+        if record.parameter == pytest.approx(0.3):
+            raise Stop
+
+    suturing = CuspSuturing(setup, observer, store)
+    with pytest.raises(Stop):
+        suturing.run()
+    found = store.load(1)
+    assert found is not None
+    assert found.directors.shape == (0, 3)
+    assert [record.name for record in found.records] == ["placement"] + ["boundary"] * 2
+    names = [name for name, *_ in suturing._levels()]
+    assert "clamped_edge" not in names
+    assert names.count("contact_wedge") == 5
+
+
+def test_stage_failed_is_an_error_of_the_solve() -> None:
+    """Truth: exit status 1, not 2."""
+    assert StageFailed("why", None, 0.0, 0).exit_status == 1
