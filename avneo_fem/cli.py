@@ -118,6 +118,9 @@ def suture(
             observer=_observer(rank),
             warn=lambda text: _people.print(f"[yellow]{escape(text)}[/]"),
         )
+    except KeyboardInterrupt:
+        _people.print("[bold red]avneo:[/] interrupted; --resume goes on from the last level")
+        raise typer.Exit(130) from None
     except AvneoError as error:
         if MPI.COMM_WORLD.size == 1:
             raise
@@ -174,6 +177,3 @@ def main() -> None:
     except AvneoError as error:
         _tell_error(error)
         sys.exit(error.exit_status)
-    except KeyboardInterrupt:
-        _people.print("[bold red]avneo:[/] interrupted; --resume goes on from the last level")
-        sys.exit(130)

@@ -47,7 +47,9 @@ VERIFIED = (
 )
 #: Clearances that cannot be had: the penalties start as stiff as they may become.
 FAILING = SMALL.replace("inside_tolerance = 0.3", "inside_tolerance = 0.001").replace(
-    "[contact]\n", "[wall]\nmaximum_stiffness = 64.0\n[contact]\nmaximum_stiffness = 16.0\n"
+    "[contact]\n",
+    "[wall]\nmaximum_stiffness = 64.0\n[clamp]\nmaximum_stiffness = 1e4\n"
+    "[contact]\nmaximum_stiffness = 16.0\n",
 )
 
 

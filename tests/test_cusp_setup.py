@@ -121,6 +121,30 @@ def test_penalties_follow_the_scene() -> None:
     assert np.abs(expected - other).max() > 1.0
 
 
+def test_clamp_penalty(setup: CuspSetup) -> None:
+    """Truth: no energy while the third node of each sutured triangle lies in its half-plane, along
+    -b from the edge; the full angle when it is turned about the edge; none of it acts yet."""
+    line, mesh = setup.mesh.suture_line, setup.mesh
+    for edge, apex in enumerate(setup.clamp.apex):
+        triangle = mesh.triangles[mesh.edge_cells[mesh.suture_edges[edge], 0]]
+        assert set(triangle) == {line[edge], line[edge + 1], apex}
+    assert setup.clamp.stiffness == 0.0
+    along = np.diff(setup.target, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    part = np.einsum("kd,kd->k", setup.conormal, along)[:, None]
+    inward = -(setup.conormal - part * along)
+    inward /= np.linalg.norm(inward, axis=1)[:, None]
+    middle = (setup.target[1:] + setup.target[:-1]) / 2
+    unique = np.unique(setup.clamp.apex, return_index=True)[1]  # a node may belong to two edges
+    for angle in (0.0, 0.7, -2.0):
+        points = setup.start.copy()
+        points[line] = setup.target
+        turned = np.cos(angle) * inward + np.sin(angle) * np.cross(along, inward)
+        points[setup.clamp.apex[unique]] = (middle + turned)[unique]
+        found = setup.clamp.angles(points)[unique]
+        np.testing.assert_allclose(np.abs(found), abs(angle), atol=1e-12)
+
+
 def test_self_contact_follows_the_scene(setup: CuspSetup) -> None:
     """Truth: min(0.3 H, 0.2 h) by default and 0.05 E H / distance^2, or what the scene says."""
     assert setup.contact.distance == pytest.approx(min(0.3 * 0.5, 0.2 * 3.0))

@@ -27,8 +27,8 @@ from avneo_fem.scene import load_scene, parse_scene
 
 FILES = ["cusp_0.stl", "cusp_1.stl", "cusp_2.stl", "report.json", "valve.h5", "valve.png"]
 FILES += ["valve.xdmf"]
-#: Types of design.md §2's keys; a list of one stands for a list of these, a number for its length.
-NUMBER, LENGTH = (int, float), {"three": 3}
+#: Types of design.md §2's keys: [kind] is a list of any length, (3, kind) one of three.
+NUMBER = (int, float)
 STAGE: dict[str, Any] = {
     "name": str,
     "parameter": NUMBER,
@@ -92,7 +92,7 @@ REPORT: dict[str, Any] = {
 
 
 def demand(value: Any, kind: Any, where: str) -> None:
-    """Fail unless a JSON value has this shape: a type, keys of an object, (length, kind), [kind]."""
+    """Fail unless a JSON value is of this kind: type, keys of an object, (length, kind), [kind]."""
     if isinstance(kind, dict):
         assert isinstance(value, dict), where
         for key, inner in kind.items():
@@ -168,8 +168,8 @@ def test_files(verified_run: Run) -> None:
 
 
 def test_surfaces_bear_the_verdict_out(verified_run: Run) -> None:
-    """Truth: figures computed anew from the STL files alone equal the report's, to the files' single
-    precision; nodes and triangles are as many as it says."""
+    """Truth: figures computed anew from the STL files alone equal the report's, to the files'
+    single precision; nodes and triangles are as many as it says."""
     report, cusps = verified_run.report, surfaces(verified_run)
     given = ValveInput.from_scene(load_scene(verified_run.scene))
     for cusp, (points, triangles) in zip(report["cusps"], cusps, strict=True):
@@ -366,8 +366,8 @@ def test_killed_twice_and_resumed(small_run: Run, tmp_path: Path) -> None:
 
 
 def test_a_new_run_replaces_the_old_report_first(small_run: Run, tmp_path: Path) -> None:
-    """Truth: a report always belongs to the files beside it: a killed run in a folder of old results
-    leaves no report."""
+    """Truth: a report always belongs to the files beside it: a run killed in a folder of old
+    results leaves no report."""
     out = tmp_path / "out"
     shutil.copytree(small_run.folder, out)
     scene = written(SMALL, tmp_path)

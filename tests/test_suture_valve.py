@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_cases import FAILING, SMALL, Run, command, environment, suture_inside, written
+from run_cases import SMALL, SMALL_ALL, Run, command, environment, suture_inside, written
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.valve_input import ValveInput
@@ -183,7 +183,7 @@ main()
 def test_an_error_on_one_rank_ends_all(tmp_path: Path, error: str, status: int, text: str) -> None:
     """Truth: the others, which wait for that rank, are ended too; its message is seen, its exit
     status is that of the run, and there is no report."""
-    scene, script = written(FAILING, tmp_path), tmp_path / "broken.py"
+    scene, script = written(SMALL_ALL, tmp_path), tmp_path / "broken.py"
     script.write_text(BROKEN_RANK.format(error=error))
     process = subprocess.run(
         command(script, "suture", scene, "-o", tmp_path / "out", ranks=2),

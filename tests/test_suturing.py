@@ -15,6 +15,7 @@ from avneo_fem.equilibrium.directors import clamp_rotation
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.results.crossings import self_intersections
+from avneo_fem.results.measures import clamp_error_deg
 from avneo_fem.scene import parse_scene
 from avneo_fem.stages.checkpoint import Checkpoint, CheckpointStore
 from avneo_fem.stages.continuation import StageFailed
@@ -60,6 +61,12 @@ class Done:
     def run(self) -> Done:
         self.result = self.suturing.run(self.resume)
         return self
+
+    @property
+    def final_state(self) -> np.ndarray:
+        """State vector of the finished cusp, as its checkpoint holds it."""
+        state: np.ndarray = pickle.loads(self.store.files[-1])[1].state
+        return state
 
     @property
     def names(self) -> list[str]:
@@ -122,7 +129,7 @@ def test_records(done: Done) -> None:
         assert record.residual <= scene.solver.path_tolerance
         assert record.reason == "converged: residual below tolerance"
     assert done.result.residual <= scene.solver.tolerance
-    anew = done.setup.system.relative_residual(done.suturing.final_state)
+    anew = done.setup.system.relative_residual(done.final_state)
     assert done.result.residual == pytest.approx(anew, rel=1e-6)
     assert done.result.records[0].iterations == 0
     assert sum(r.iterations for r in done.result.records) == done.setup.newton.iterations > 50
@@ -153,25 +160,37 @@ def test_never_crosses_itself(done: Done) -> None:
 
 
 def test_clamp(done: Done) -> None:
-    """Truth: the directors of the sutured edges end in the prescribed half-plane, although the
-    state went through all later stages."""
-    setup, state = done.setup, done.suturing.final_state
-    rest = clamp_rotation(setup.model, state, setup.conormal)
-    # the edge is clamped at its position of then: it did not move since
+    """Truth: the directors of the sutured edges end exactly in the prescribed half-plane, although
+    the state went through all later stages; the triangles there to the allowed 5 degrees rms, by
+    the judge's own measure."""
+    setup = done.setup
+    rest = clamp_rotation(setup.model, done.final_state, setup.conormal)
     np.testing.assert_allclose(rest, 0.0, atol=1e-9)
+    line = setup.mesh.suture_line
+    pairs = np.c_[line[:-1], line[1:]]
+
+    def rms(points: np.ndarray) -> float:
+        return clamp_error_deg(points, setup.mesh.triangles, pairs, setup.conormal)[1]
+
+    assert rms(done.result.points) <= 5.0
+    assert rms(done.result.points) == pytest.approx(done.suturing.shortfalls(done.result.points)[2])
+    hinged = done.result.snapshots[11]
+    assert hinged.name == "hinged_edge"
+    assert rms(hinged.points) > 20.0
 
 
 def test_clearances(done: Done) -> None:
-    """Truth: by the signed distances themselves, no free node misses its clearance from wall or
-    wedge (lambda = 1) by more than the scene allows."""
+    """Truth: by the distances' formulas, no free node misses its clearance by more than the scene
+    allows: H/2 from the wedge (lambda = 1) and from the wall; within the taper of 5 H just the
+    wall itself."""
     setup, points = done.setup, done.result.points
     free = np.setdiff1d(np.arange(len(points)), setup.mesh.suture_line)
-    s = setup.mesh.distance_to_suture[free]
-    wall = 12.0 - np.hypot(*points[free, :2].T) - 0.25 * np.minimum(1.0, s / 2.5) ** 2
+    near = setup.mesh.distance_to_suture[free] < 2.5
+    wall = 12.0 - np.hypot(*points[free, :2].T) - np.where(near, 0.0, 0.25)
     wedge = setup.wedges.wedge(1, 1.0).evaluate(points[free])[0] - 0.25
     assert wall.min() >= -0.3
     assert wedge.min() >= -0.3
-    misses = done.suturing.shortfalls(points)
+    misses = done.suturing.shortfalls(points)[:2]
     assert misses == pytest.approx((max(0.0, -wall.min()), max(0.0, -wedge.min())), abs=1e-12)
 
 
@@ -199,13 +218,14 @@ def test_clearances_out_of_reach(done: Done, tmp_path: Path) -> None:
     run = after(done, 19, tmp_path, set_up(FAILING)).run()
     assert run.result.failure is not None
     assert run.result.failure.startswith("root_wall: ")
-    wall, wedge = run.suturing.shortfalls(run.result.points)
+    wall, wedge, clamp = run.suturing.shortfalls(run.result.points)
     assert max(wall, wedge) > 0.001
     for text in (
-        f"{wall:.3f} mm short of the clearance from the wall",
+        f"short of the clearance by {wall:.3f} mm from the wall",
         f"{wedge:.3f} mm from the contact wedge",
-        "eta_1 = 64 and 16 kPa",
-        "raise wall.maximum_stiffness, contact.maximum_stiffness or solver.inside_tolerance",
+        f"clamp off by {clamp:.1f} degrees rms",
+        "penalties of 64 kPa, 16 kPa and 10000 mN",
+        "raise maximum_stiffness of wall, contact or clamp",
     ):
         assert text in run.result.failure
     assert run.names[19:] == ["equilibrium"]  # nothing could be raised
@@ -215,15 +235,19 @@ def test_clearances_out_of_reach(done: Done, tmp_path: Path) -> None:
 def test_stiffness_is_raised_as_said(done: Done, tmp_path: Path) -> None:
     """Truth: eta_1 grows by ``growth`` from level to level until the clearances hold, and only of
     what misses its own; the last equilibrium is reached with those values."""
-    tight = {"inside_tolerance": 0.01}
+    tight = {"inside_tolerance": 0.05}
     run = after(done, 19, tmp_path, set_up(solver=tight, wall={"growth": 3.0})).run()
     raised = [record for record in run.result.records if record.name == "root_wall"]
     assert run.result.failure is None
     assert raised
-    assert max(run.suturing.shortfalls(run.result.points)) <= 0.01
-    stiffness = np.array([run.setup.wall.stiffness, run.setup.wedge.stiffness])
-    powers = np.log(stiffness / [64.0, 16.0]) / np.log(3.0)
+    misses = run.suturing.shortfalls(run.result.points)
+    assert max(misses[:2]) <= 0.05
+    assert misses[2] <= 5.0
+    terms = (run.setup.wall, run.setup.wedge, run.setup.clamp)
+    stiffness = np.array([term.stiffness for term in terms])
+    powers = np.log(stiffness / [64.0, 16.0, 1e4]) / np.log(3.0)
     np.testing.assert_allclose(powers, np.round(powers), atol=1e-9)
+    assert powers.min() >= 0
     assert powers.max() == pytest.approx(len(raised))
     assert run.names[-1] == "equilibrium"
     assert run.result.records[-1].parameter == stiffness[0]
@@ -269,7 +293,7 @@ def test_a_failed_attempt_is_taken_back(
     run.run()
     assert run.result.failure is None
     assert [record.substeps for record in run.result.records[12:19]] == [2] * 7
-    rest = clamp_rotation(run.setup.model, run.suturing.final_state, run.setup.conormal)
+    rest = clamp_rotation(run.setup.model, run.final_state, run.setup.conormal)
     np.testing.assert_allclose(rest, 0.0, atol=1e-9)
 
 
@@ -372,7 +396,7 @@ def test_without_bending(tmp_path: Path) -> None:
     found = store.load(1)
     assert found is not None
     assert found.directors.shape == (0, 3)
-    assert [record.name for record in found.records] == ["placement"] + ["boundary"] * 2
+    assert [record.name for record in found.records] == ["placement"] + ["boundary"] * 3
     names = [name for name, *_ in suturing._levels()]
     assert "clamped_edge" not in names
     assert names.count("contact_wedge") == 5

@@ -145,6 +145,15 @@ def test_tolerances(tables: dict[str, Any], cusps: float, wall: float) -> None:
     assert found.wall_distance_mm == pytest.approx(wall)
     assert (found.residual, found.inside_mm) == (1e-7, 0.03)
     assert found.suture_mm == 1e-6
+    assert found.clamp_deg == 5.0
+
+
+def test_the_clamp_is_judged_with_bending_only() -> None:
+    """Truth: the scene's limit; a membrane cannot be clamped."""
+    for bending, expected in ((True, 3.0), (False, np.inf)):
+        tables = {"clamp": {"tolerance_degrees": 3.0}, "material": {"bending": bending}}
+        scene = parse_scene(tables)
+        assert tolerances_of(scene, ValveInput.from_scene(scene).geometry).clamp_deg == expected
 
 
 def test_the_index_of_the_result_decides() -> None:

@@ -37,6 +37,11 @@ class ClampPenalty:
         l_e, lengths of the edges in the template [mm].
     stiffness : float
         k [mN].
+
+    Attributes
+    ----------
+    turned : (k,) array
+        Angles from which further rotations are counted [rad].
     """
 
     def __init__(
@@ -56,18 +61,18 @@ class ClampPenalty:
         self._origin = edges[:, 0]
         self._inward = -across / np.linalg.norm(across, axis=1, keepdims=True)
         self._normal = np.cross(tangent, -self._inward)
-        self._turned = np.zeros(len(apex))
+        self.turned = np.zeros(len(apex))
 
     def _polar(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Angle, squared distance from the edge, and the frame turned by the counted angle."""
-        cosine, sine = np.cos(self._turned)[:, None], np.sin(self._turned)[:, None]
+        cosine, sine = np.cos(self.turned)[:, None], np.sin(self.turned)[:, None]
         first = cosine * self._inward + sine * self._normal
         second = cosine * self._normal - sine * self._inward
         arm = points[self.apex] - self._origin
         x, y = np.einsum("kd,kd->k", arm, first), np.einsum("kd,kd->k", arm, second)
         radial = x[:, None] * first + y[:, None] * second
         turning = x[:, None] * second - y[:, None] * first
-        return self._turned + np.arctan2(y, x), x**2 + y**2, radial, turning, arm
+        return self.turned + np.arctan2(y, x), x**2 + y**2, radial, turning, arm
 
     def angles(self, points: Floats) -> Floats:
         """(k,) theta_e, counted without a jump since the last :meth:`renew` [rad]."""
@@ -79,7 +84,7 @@ class ClampPenalty:
 
     def renew(self, points: Floats) -> None:
         """Count further rotations from the present angles."""
-        self._turned = self.angles(points)
+        self.turned = self.angles(points)
 
     def energy(self, points: Floats) -> float:
         """Energy [mN mm]."""

@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 class Checkpoint:
     """Where a cusp stands: the state, what it took, and how many levels are complete.
 
+    ``penalty_stiffness`` is that of wall, wedge and clamp, ``clamp_turned`` the clamp's count.
     ``finished`` says that nothing is left to do; then ``residual`` and ``failure`` are those of
     the result.
     """
@@ -32,6 +33,7 @@ class Checkpoint:
     directors: Floats
     levels_done: int
     penalty_stiffness: tuple[float, float, float]
+    clamp_turned: Floats
     records: list[StageRecord]
     snapshots: list[Snapshot]
     finished: bool = False

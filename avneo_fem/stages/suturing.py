@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from avneo_fem.constraints.clamp_penalty import ClampPenalty
 from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
 from avneo_fem.equilibrium.directors import clamp_rotation, renew_directors, start_directors
 from avneo_fem.meshing.harmonic import harmonic_extension
@@ -115,6 +116,7 @@ class CuspSuturing:
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         stiffness = checkpoint.penalty_stiffness
         setup.wall.stiffness, setup.wedge.stiffness, setup.clamp.stiffness = stiffness
+        setup.clamp.turned = checkpoint.clamp_turned
         self._set_directors(checkpoint.directors)
         return checkpoint.state
 
@@ -137,12 +139,13 @@ class CuspSuturing:
         if self.store is None:
             return
         setup = self.setup
-        stiffness = (setup.wall.stiffness, setup.wedge.stiffness)
+        stiffness = (setup.wall.stiffness, setup.wedge.stiffness, setup.clamp.stiffness)
         kept = Checkpoint(
             state=state,
             directors=self._directors(),
             levels_done=done,
             penalty_stiffness=stiffness,
+            clamp_turned=setup.clamp.turned,
             records=self.records,
             snapshots=self.snapshots,
             finished=finished,
@@ -237,9 +240,9 @@ class CuspSuturing:
         points = setup.system.positions(state)
         self.records.append(record)
         self.snapshots.append(Snapshot(name, parameter, points, self._fields(points)))
-        self.observer(setup.index, record)
         if done is not None:
             self._save(state, done)
+        self.observer(setup.index, record)
 
     def _fields(self, points: Floats) -> dict[str, Floats]:
         """Distances and penalty pressure at the nodes, for ParaView."""
@@ -263,11 +266,12 @@ class CuspSuturing:
         setup, model = self.setup, self.setup.model
 
         def safe(state: Floats, start: float, stop: float) -> Outcome:
-            pressure, field = model.pressure, setup.wedge.field
+            pressure, field, clamp = model.pressure, setup.wedge.field, setup.clamp.stiffness
             directors = self._directors()
             result, reason = attempt(state, start, stop)
             if result is None:
                 model.pressure, setup.wedge.field = pressure, field
+                setup.clamp.stiffness = clamp
                 self._set_directors(directors)
             return result, reason
 
@@ -352,7 +356,7 @@ class CuspSuturing:
         setup, scene = self.setup, self.setup.scene
         inside = self.options.inside_tolerance
         allowed = (inside, inside, scene.clamp.tolerance_degrees)
-        terms = (setup.wall, setup.wedge, setup.clamp)
+        terms: list[SignedDistancePenalty | ClampPenalty] = [setup.wall, setup.wedge, setup.clamp]
         limits = (
             scene.wall.maximum_stiffness,
             scene.contact.maximum_stiffness,
@@ -395,7 +399,9 @@ class CuspSuturing:
         self.setup.clamp.renew(self.setup.system.positions(state))
         state, verdict = relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
         stiffness = self.setup.wall.stiffness
-        self._keep(state, name, stiffness, used, verdict.reason, clock, 1, len(self._levels()))
+        # after the last equilibrium comes the checkpoint of the finished cusp
+        done = None if name == "equilibrium" else len(self._levels())
+        self._keep(state, name, stiffness, used, verdict.reason, clock, 1, done)
         if not verdict.converged:
             message = (
                 f"{name}: residual {verdict.residual:.1e} of the pressure load, wanted"
