@@ -153,8 +153,9 @@ class NewtonSolver:
             if clear < 1.0:
                 share *= self.settings.safety * clear
         # a shortened step asks for more damping next time, a full one for less
-        self._shift = self._shift / 4 if share > 0.5 else max(2 * self._shift, 0.05)
-        if self._shift < 1e-3:
+        first = self.settings.first_shift
+        self._shift = self._shift / 4 if share > 0.5 else max(2 * self._shift, 0.5 * first)
+        if self._shift < 0.01 * first:
             self._shift = 0.0
         return share
 
