@@ -204,7 +204,9 @@ def test_snapshot_fields(done: Done) -> None:
     shot = done.result.snapshots[-1]
     distance = setup.wedges.wedge(1, 1.0).evaluate(shot.points)[0]
     np.testing.assert_allclose(shot.fields["wedge_distance"], distance, atol=1e-12)
-    wedge = setup.wedge.stiffness * np.maximum(1 - 2 * (distance - 0.25) / setup.wedge.width, 0)
+    wedge = setup.wedge.stiffness * np.maximum(
+        1 - 2 * (distance - setup.wedge.clearance) / setup.wedge.width, 0
+    )
     to_wall = shot.fields["wall_distance"] - setup.wall.clearance
     wall = setup.wall.stiffness * np.maximum(1 - 2 * to_wall / setup.wall.width, 0)
     np.testing.assert_allclose(shot.fields["penalty_pressure"], wedge + wall, atol=1e-9)

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from avneo_fem.constraints.clamp_penalty import ClampPenalty
 from avneo_fem.constraints.self_contact import SelfContact
@@ -20,7 +21,7 @@ from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.scene import Scene
 from avneo_fem.stages.placement import place_template
 
-__all__ = ["CuspSetup", "clearances"]
+__all__ = ["CuspSetup", "clearances", "near_suture"]
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +40,30 @@ def clearances(scene: Scene, index: int, distance_to_suture: Floats) -> tuple[Fl
     if taper > 0:
         share = np.square(np.minimum(1.0, distance_to_suture / taper))
     return wall * share, np.full(len(distance_to_suture), wedge)
+
+
+def near_suture(clearance: Floats, line: Floats, mesh: CuspMesh, taper: float) -> Floats:
+    """Clearance from the wedge where the sutured edge itself lies closer (design.md §1).
+
+    Parameters
+    ----------
+    clearance : (n,) array
+        d_0 of every node [mm].
+    line : (k,) array
+        Distance of the sutured nodes from the wedge of lambda = 1 [mm].
+    mesh : CuspMesh
+    taper : float
+        Distance in the template over which d_0 grows from that of the edge to its full value.
+
+    Returns
+    -------
+    (n,) array
+        d_0 [mm]; unchanged where the nearest sutured node keeps it.
+    """
+    _, nearest = cKDTree(mesh.points[mesh.suture_line]).query(mesh.points)
+    at_edge = np.clip(line[nearest], 0.0, clearance)
+    share = np.minimum(1.0, mesh.distance_to_suture / taper)
+    return at_edge + (clearance - at_edge) * share
 
 
 class CuspSetup:
@@ -124,6 +149,8 @@ class CuspSetup:
         """Wall and wedge; neither acts until a stage puts it among the system's terms."""
         scene, mesh = self.scene, self.mesh
         from_wall, from_wedge = clearances(scene, self.index, mesh.distance_to_suture)
+        line = self.wedges.wedge(self.index, 1.0).signed_distance(self.target)
+        from_wedge = near_suture(from_wedge, line, mesh, 5 * self.cusp.thickness)
         options, areas = scene.wall, mesh.node_areas
         wall = SignedDistancePenalty(
             self.geometry.root, areas, options.stiffness, options.width, from_wall
