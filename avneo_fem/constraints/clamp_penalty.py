@@ -63,8 +63,8 @@ class ClampPenalty:
         self._normal = np.cross(tangent, -self._inward)
         self.turned = np.zeros(len(apex))
 
-    def _polar(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Angle, squared distance from the edge, and the frame turned by the counted angle."""
+    def _polar(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Angle, squared distance from the edge, and the arm across it: radial, turned by 90."""
         cosine, sine = np.cos(self.turned)[:, None], np.sin(self.turned)[:, None]
         first = cosine * self._inward + sine * self._normal
         second = cosine * self._normal - sine * self._inward
@@ -72,10 +72,10 @@ class ClampPenalty:
         x, y = np.einsum("kd,kd->k", arm, first), np.einsum("kd,kd->k", arm, second)
         radial = x[:, None] * first + y[:, None] * second
         turning = x[:, None] * second - y[:, None] * first
-        return self.turned + np.arctan2(y, x), x**2 + y**2, radial, turning, arm
+        return self.turned + np.arctan2(y, x), x**2 + y**2, radial, turning
 
     def angles(self, points: Floats) -> Floats:
-        """(k,) theta_e, counted without a jump since the last :meth:`renew` [rad]."""
+        """(k,) theta_e from -b towards t x b, counted without a jump since :meth:`renew` [rad]."""
         return self._polar(points)[0]
 
     def rms_angle(self, points: Floats) -> float:
@@ -92,7 +92,7 @@ class ClampPenalty:
 
     def gradient(self, points: Floats) -> Floats:
         """(n, 3) [mN]."""
-        angle, square, _, turning, _ = self._polar(points)
+        angle, square, _, turning = self._polar(points)
         result = np.zeros((self.count, 3))
         force = (self.stiffness * self.lengths * angle / square)[:, None] * turning
         np.add.at(result, self.apex, force)
@@ -100,7 +100,7 @@ class ClampPenalty:
 
     def hessian(self, points: Floats) -> sp.spmatrix:
         """(3n, 3n) [mN/mm]: k l (grad theta grad theta^T + theta grad grad theta)."""
-        angle, square, radial, turning, _ = self._polar(points)
+        angle, square, radial, turning = self._polar(points)
         load = self.stiffness * self.lengths
         mixed = radial[:, :, None] * turning[:, None, :]
         bend = -(mixed + mixed.transpose(0, 2, 1)) / (square**2)[:, None, None]
