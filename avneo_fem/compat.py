@@ -20,6 +20,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 _set_flags: Callable[[int], None] = sys.setdlopenflags
@@ -44,20 +46,29 @@ __all__ = [
     "MPI",
     "PETSC_ERROR",
     "PETSc",
+    "cell_areas",
+    "cell_dofs",
     "clear_stale_kernels",
     "compile_form",
     "create_mesh",
+    "dofs_of_parts",
+    "edge_dofs",
     "edge_tags",
+    "edge_trace_element",
     "fem",
     "fem_petsc",
     "function_space",
     "install_abort_on_error",
+    "interpolated",
     "kernel_cache",
+    "lagrange_slopes",
+    "match_edges",
     "match_points",
     "mixed_space",
     "scalar_element",
     "ufl",
     "vector_element",
+    "vector_nodes",
     "versions",
 ]
 
@@ -164,25 +175,30 @@ def edge_tags(domain: Any, midpoints: NDArray[np.float64], tag: int) -> Any:
     RuntimeError
         When there is no edge at one of the midpoints.
     """
-    domain.topology.create_entities(1)
-    domain.topology.create_connectivity(1, 2)
-    edges = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
-    chosen = np.sort(edges[match_points(mesh.compute_midpoints(domain, 1, edges), midpoints)])
+    chosen = np.sort(match_edges(domain, midpoints)).astype(np.int32)
     return mesh.meshtags(domain, 1, chosen, np.full(len(chosen), tag, dtype=np.int32))
 
 
-def vector_element(domain: Any, family: str, dimension: int = 3) -> Any:
-    """Lowest-order element with vector values (``family``: "Lagrange" or "CR")."""
+def vector_element(domain: Any, family: str, dimension: int = 3, degree: int = 1) -> Any:
+    """Element with vector values (``family``: "Lagrange", "DG" or "CR")."""
     if _elements is not None:
-        return _elements.element(family, "triangle", 1, shape=(dimension,))
-    return ufl.VectorElement(family, domain.ufl_cell(), 1, dim=dimension)
+        return _elements.element(family, "triangle", degree, shape=(dimension,))
+    return ufl.VectorElement(family, domain.ufl_cell(), degree, dim=dimension)
 
 
-def scalar_element(domain: Any, family: str) -> Any:
-    """Lowest-order scalar element."""
+def scalar_element(domain: Any, family: str, degree: int = 1) -> Any:
+    """Scalar element, or a vector-valued one that is not made of scalars."""
     if _elements is not None:
-        return _elements.element(family, "triangle", 1)
-    return ufl.FiniteElement(family, domain.ufl_cell(), 1)
+        return _elements.element(family, "triangle", degree)
+    return ufl.FiniteElement(family, domain.ufl_cell(), degree)
+
+
+def edge_trace_element(domain: Any, degree: int) -> Any:
+    """Nedelec element whose tangential trace on an edge is any polynomial of this degree, told
+    by the unknowns of that edge alone."""
+    if degree == 0:
+        return scalar_element(domain, "N1curl", 1)
+    return scalar_element(domain, "N2curl", degree)
 
 
 def function_space(domain: Any, element: Any) -> Any:
@@ -197,6 +213,86 @@ def mixed_space(domain: Any, elements: list[Any]) -> Any:
     if _elements is not None:
         return function_space(domain, _elements.mixed_element(elements))
     return function_space(domain, ufl.MixedElement(elements))
+
+
+def cell_dofs(space: Any) -> NDArray[np.int64]:
+    """(m, k) unknowns (blocks, for vector elements) of every cell."""
+    table = space.dofmap.list
+    count = space.mesh.topology.index_map(2).size_local
+    return np.asarray(getattr(table, "array", table), dtype=np.int64).reshape(count, -1)
+
+
+def dofs_of_parts(space: Any, parts: list[int]) -> NDArray[np.int64]:
+    """Unknowns of some scalar parts of a mixed space, cell by cell, in the whole's numbering."""
+    return np.concatenate([cell_dofs(space.sub(part)) for part in parts], axis=1).ravel()
+
+
+def vector_nodes(space: Any, degree: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Unknowns (n, 3) and coordinates (n, 2) of the nodes of the first part of a mixed space.
+
+    From degree 3 on DOLFINx 0.5.2 collapses that part with the nodes of some edges exchanged, so
+    the coordinates come from an L2 projection.
+    """
+    domain = space.mesh
+    triples = np.unique(cell_dofs(space.sub(0)).reshape(-1, 3), axis=0)
+    if degree < 3:
+        collapsed, numbers = space.sub(0).collapse()
+        place = dict(zip(numbers[::3], collapsed.tabulate_dof_coordinates()[:, :2], strict=True))
+        return triples, np.array([place[first] for first in triples[:, 0]])
+    parts = zip(ufl.TestFunctions(space), ufl.TrialFunctions(space), strict=True)
+    dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 2 * degree})
+    mass = compile_form(sum(ufl.inner(test, trial) for test, trial in parts) * dx)
+    x, y = ufl.SpatialCoordinate(domain)
+    right = compile_form(ufl.inner(ufl.as_vector([x, y, 0 * x]), ufl.TestFunctions(space)[0]) * dx)
+    matrix = fem_petsc.assemble_matrix(mass)
+    matrix.assemble()
+    rows, columns, values = matrix.getValuesCSR()
+    projected = splu(csc_matrix(csr_matrix((values, columns, rows)))).solve(
+        fem_petsc.assemble_vector(right).array_r
+    )
+    return triples, projected[triples[:, :2]]
+
+
+def cell_areas(domain: Any) -> NDArray[np.float64]:
+    """(m,) areas of the triangles in DOLFINx's own order."""
+    table = domain.geometry.dofmap
+    nodes = np.asarray(getattr(table, "array", table)).reshape(-1, 3)
+    a, b, c = (domain.geometry.x[nodes[:, k], :2] for k in range(3))
+    u, v = b - a, c - a
+    return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def edge_dofs(space: Any, number: int) -> NDArray[np.int64]:
+    """(e, number) unknowns of each edge of a space whose first unknowns are ``number`` an edge."""
+    domain = space.mesh
+    domain.topology.create_entities(1)
+    domain.topology.create_connectivity(2, 1)
+    links = domain.topology.connectivity(2, 1).array.reshape(-1, 3)
+    of_edge = np.empty((domain.topology.index_map(1).size_local, number), dtype=np.int64)
+    of_edge[links.ravel()] = cell_dofs(space)[:, : 3 * number].reshape(-1, number)
+    return of_edge
+
+
+def match_edges(domain: Any, midpoints: NDArray[np.float64]) -> NDArray[np.int64]:
+    """DOLFINx's edge at each of the ``midpoints`` (n, 2)."""
+    domain.topology.create_entities(1)
+    domain.topology.create_connectivity(1, 2)
+    edges = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
+    return match_points(mesh.compute_midpoints(domain, 1, edges), midpoints)
+
+
+def interpolated(space: Any, value: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unknowns of the interpolant of a constant vector."""
+    function = fem.Function(space)
+    function.interpolate(lambda x: np.tile(value[:, None], (1, x.shape[1])))
+    return function.x.array.copy()
+
+
+def lagrange_slopes(degree: int) -> NDArray[np.float64]:
+    """(k, k, 2) reference gradients at node q (first index) of shape function j (second)."""
+    kind = basix.LagrangeVariant.gll_warped  # type: ignore[attr-defined]
+    element = basix.create_element(basix.ElementFamily.P, basix.CellType.triangle, degree, kind)
+    return np.asarray(element.tabulate(1, element.points)[1:, :, :, 0].transpose(1, 2, 0))
 
 
 def versions() -> dict[str, str]:

@@ -26,11 +26,21 @@ class CuspSystem:
         Elastic energy, pressure and free-edge force.
     contact : SelfContact or None
         Barrier and step filter; None lets layers cross.
+
+    Attributes
+    ----------
+    dead_load : (size,) array or None
+        Generalised forces that do not follow the motion, conjugate to the entries of the state:
+        forces on positions [mN], moments on angles [mN mm].
+    force_scale : float or None
+        What residuals are given relative to [mN]; None: the pressure load P x area.
     """
 
     def __init__(self, model: ShellModel, contact: SelfContact | None) -> None:
         self.model, self.contact = model, contact
         self.terms: list[Term] = []
+        self.dead_load: Floats | None = None
+        self.force_scale: float | None = None
         self.fixed = np.zeros(model.size, dtype=bool)
         self._expand = self._expansion()
 
@@ -54,6 +64,10 @@ class CuspSystem:
         """Indices of the free unknowns."""
         return np.flatnonzero(~self.fixed)
 
+    def load_scale(self) -> float:
+        """Force that residuals are given relative to [mN]."""
+        return self.model.load_scale() if self.force_scale is None else self.force_scale
+
     def _active(self, extra: Sequence[Term]) -> list[Term]:
         contact = [] if self.contact is None else [self.contact]
         return [*contact, *self.terms, *extra]
@@ -61,14 +75,16 @@ class CuspSystem:
     def residual(self, state: Floats, extra: Sequence[Term] = ()) -> Floats:
         """Out-of-balance force of every unknown, (size,); held ones carry their reaction."""
         result = self.model.residual(state)
+        if self.dead_load is not None:
+            result -= self.dead_load
         points = self.positions(state)
         for term in self._active(extra):
             result[self.model.position_dofs] += term.gradient(points)
         return result
 
     def relative_residual(self, state: Floats) -> float:
-        """Norm of the undamped residual over the pressure load P x area."""
-        return float(np.linalg.norm(self.residual(state)[self.free]) / self.model.load_scale())
+        """Norm of the undamped residual over the load scale."""
+        return float(np.linalg.norm(self.residual(state)[self.free]) / self.load_scale())
 
     def tangent(self, state: Floats, extra: Sequence[Term] = ()) -> sp.csr_matrix:
         """Derivative of :meth:`residual`, (size, size)."""
@@ -99,4 +115,5 @@ class CuspSystem:
     def energy(self, state: Floats, extra: Sequence[Term] = ()) -> float:
         """Energy of all conservative parts [mN mm]."""
         points = self.positions(state)
-        return self.model.energy(state) + sum(t.energy(points) for t in self._active(extra))
+        dead = 0.0 if self.dead_load is None else float(self.dead_load @ state)
+        return self.model.energy(state) - dead + sum(t.energy(points) for t in self._active(extra))

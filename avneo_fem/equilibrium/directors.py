@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from avneo_fem.equilibrium.high_order_shell import HighOrderShell
 from avneo_fem.equilibrium.shell_model import ShellModel
 
-__all__ = ["clamp_rotation", "current_directors", "renew_directors", "start_directors"]
+__all__ = [
+    "clamp_rotation",
+    "current_directors",
+    "renew_directors",
+    "start_directors",
+    "turn_directors",
+]
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +55,8 @@ def start_directors(model: ShellModel, state: Floats) -> Floats:
     """Directors along the mean normal of the adjacent triangles; returns the state, angles 0."""
     if not model.parameters.bending:
         return state
+    if isinstance(model, HighOrderShell):
+        return model.start_directors(state)
     points = state[model.position_dofs]
     model.set_directors(_mean_normals(model, points, _edge_tangents(model, points)))
     result = state.copy()
@@ -73,6 +82,8 @@ def renew_directors(model: ShellModel, state: Floats) -> Floats:
     """
     if not model.parameters.bending:
         return state
+    if isinstance(model, HighOrderShell):
+        return model.renew_directors(state)
     points = state[model.position_dofs]
     tangent = _edge_tangents(model, points)
     before = _across(model.directors, tangent)
@@ -81,6 +92,21 @@ def renew_directors(model: ShellModel, state: Floats) -> Floats:
     result = state.copy()
     result[model.angle_dofs] -= np.arctan2(sine, np.einsum("ed,ed->e", before, after))
     model.set_directors(after)
+    return result
+
+
+def turn_directors(
+    model: ShellModel, state: Floats, edges: NDArray[np.int64], angle: Floats
+) -> Floats:
+    """State with the directors of some edges (k,) turned by ``angle`` (k,) [rad] about these
+    edges as stored in ``mesh.edges``."""
+    result = state.copy()
+    if isinstance(model, HighOrderShell):
+        result[model.angle_dofs[edges]] += (
+            np.asarray(angle)[:, None] * model.unit_rotations()[edges]
+        )
+    else:
+        result[model.angle_dofs[edges]] += angle
     return result
 
 

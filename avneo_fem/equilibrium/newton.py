@@ -177,10 +177,10 @@ class NewtonSolver:
         clock = time.perf_counter()
         system = self.system
         self._start, self._extra, self._free = state.copy(), extra, system.free
-        self._scale = system.model.load_scale()
+        self._scale = system.load_scale()
         self._target = tolerance * self._scale
         mass = np.zeros(system.model.size)
-        mass[system.model.position_dofs] = system.model.mesh.node_areas[:, None]
+        mass[system.model.position_dofs] = system.model.node_areas[:, None]
         self._mass = mass[self._free]
         self._shift = 0.0
         size = len(self._free)

@@ -60,7 +60,7 @@ class Relaxation:
     def _damping(self, state: Floats, damping: float) -> list[ProximalTerm]:
         system = self.system
         strength = damping * self.settings.damping_unit
-        return [ProximalTerm(system.positions(state), system.model.mesh.node_areas, strength)]
+        return [ProximalTerm(system.positions(state), system.model.node_areas, strength)]
 
     def settle(
         self, state: Floats, tolerance: float, damping: float, budget: int

@@ -53,6 +53,11 @@ class ShellParameters:
         ``neo_hookean`` or ``st_venant_kirchhoff``.
     bending : bool
         Kirchhoff-Love bending on or off (c^b of (1.7)); off allocates no edge angles.
+    degree : int
+        Polynomial degree k of the positions; above 1 ``equilibrium.high_order_shell`` takes over.
+    membrane_quadrature : int or None
+        Quadrature degree of the membrane energy; None: 2k - 2, but 1 for k = 1. For k = 2 these
+        three points keep thin shells from locking in their membrane part.
     young_modulus, thickness, pressure : float
         E [kPa], H [mm], P [kPa].
     free_edge_stiffness, free_edge_width, free_edge_clearance : float
@@ -65,6 +70,8 @@ class ShellParameters:
 
     material: str = "neo_hookean"
     bending: bool = True
+    degree: int = 1
+    membrane_quadrature: int | None = None
     young_modulus: float = 1000.0
     thickness: float = 0.5
     pressure: float = 8.0
@@ -97,15 +104,31 @@ class ShellModel:
     def __init__(self, mesh: CuspMesh, parameters: ShellParameters) -> None:
         self.mesh, self.parameters = mesh, parameters
         self.domain = compat.create_mesh(mesh.points, mesh.triangles)
+        self._make_space(parameters.degree)
+        self._state, self._base = fem.Function(self.space), fem.Function(self.space)
+        # one constant with all numbers: UFL orders several by the text of their serial numbers
+        # ("10" < "9"), so that the same form would now and then be compiled again
+        self._constants = fem.Constant(self.domain, np.zeros(_NUMBER_OF_CONSTANTS))
+        for name in _CONSTANTS:
+            if name != "free_edge_load":
+                self._set(name, getattr(parameters, name))
+        self.free_edge_stiffness = parameters.free_edge_stiffness
+        self._compile(parameters)
+
+    def _make_space(self, degree: int) -> None:
+        """Space of the state and the places of positions and angles in it."""
+        if degree != 1:
+            raise ValueError("this shell is piecewise linear; see high_order_shell.shell_model")
+        mesh = self.mesh
         position_element = compat.vector_element(self.domain, "Lagrange")
-        if parameters.bending:
+        if self.parameters.bending:
             angle_element = compat.scalar_element(self.domain, "CR")
             self.space = compat.mixed_space(self.domain, [position_element, angle_element])
             position_space, position_map = self.space.sub(0).collapse()
             angle_space, angle_map = self.space.sub(1).collapse()
             midpoints = mesh.points[mesh.edges].mean(axis=1)
             rows = compat.match_points(angle_space.tabulate_dof_coordinates(), midpoints)
-            self.angle_dofs = np.asarray(angle_map, dtype=np.int64)[rows]
+            self.angle_dofs: Ints = np.asarray(angle_map, dtype=np.int64)[rows]
             self._director, rows = self._edge_function(midpoints, 3)
             self._director_rows = rows
             self._direction, rows = self._edge_function(midpoints, 2)
@@ -118,57 +141,67 @@ class ShellModel:
             position_space, position_map = self.space, np.arange(3 * len(mesh.points))
             self.angle_dofs = np.empty(0, dtype=np.int64)
         nodes = compat.match_points(position_space.tabulate_dof_coordinates(), mesh.points)
+        self._place_positions(nodes, position_map, mesh.points)
+
+    def _place_positions(self, nodes: Ints, position_map: Any, points: Floats) -> None:
         blocks = 3 * nodes[:, None] + np.arange(3)
         self.position_dofs: Ints = np.asarray(position_map, dtype=np.int64)[blocks]
-        self._compile()
+        self.node_points = points
 
-    def _compile(self) -> None:
-        p, domain = self.parameters, self.domain
-        self._state, self._base = fem.Function(self.space), fem.Function(self.space)
-        # one constant with all numbers: UFL orders several by the text of their serial numbers
-        # ("10" < "9"), so that the same form would now and then be compiled again
-        self._constants = fem.Constant(domain, np.zeros(_NUMBER_OF_CONSTANTS))
-        c = {name: _part(self._constants, place) for name, place in _CONSTANTS.items()}
-        for name in _CONSTANTS:
-            if name != "free_edge_load":
-                self._set(name, getattr(p, name))
+    def _bending(self, rigidity: Any) -> tuple[Any, Any]:
+        """Bending energy, and the functional whose derivative is its force (here the same)."""
         position, angle = self._split(self._state)
+        density = bending_energy_density(
+            self.domain, position, angle, self._director, self._direction, rigidity
+        )
+        energy = density * self._dx(1)
+        return energy, energy
+
+    def _dx(self, degree: int) -> Any:
+        metadata = {"quadrature_degree": degree}
+        return ufl.Measure("dx", domain=self.domain, metadata=metadata)
+
+    def _compile(self, p: ShellParameters) -> None:
+        c = {name: _part(self._constants, place) for name, place in _CONSTANTS.items()}
+        position, _ = self._split(self._state)
         start, _ = self._split(self._base)
         gradient = ufl.grad(position)
-        dx = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 1})
-        dx2 = ufl.Measure("dx", domain=domain, metadata={"quadrature_degree": 2})
+        # P x cofactor of F: degree 3k - 2 with the position, exactly
+        membrane_dx, pressure_dx = self._dx(self.membrane_quadrature), self._dx(3 * p.degree - 2)
         ends = self.mesh.points[self.mesh.free_edge]
-        tags = compat.edge_tags(domain, (ends[:-1] + ends[1:]) / 2, _FREE_EDGE)
+        tags = compat.edge_tags(self.domain, (ends[:-1] + ends[1:]) / 2, _FREE_EDGE)
         ds = ufl.Measure(
-            "ds", domain=domain, subdomain_data=tags, metadata={"quadrature_degree": 2}
+            "ds",
+            domain=self.domain,
+            subdomain_data=tags,
+            metadata={"quadrature_degree": 2 * p.degree},
         )(_FREE_EDGE)
         material = material_named(p.material, c["young_modulus"])
-        energy = membrane_energy_density(gradient, material, c["thickness"]) * dx
-        if p.bending:
-            rigidity = c["young_modulus"] * c["thickness"] ** 3 / 12
-            bending = bending_energy_density(
-                domain, position, angle, self._director, self._direction, rigidity
-            )
-            energy += bending * dx
+        energy = membrane_energy_density(gradient, material, c["thickness"]) * membrane_dx
         height = ufl.dot(position - c["plane_point"], c["plane_normal"]) - (
-            ufl.SpatialCoordinate(domain)[1] - c["template_level"]
+            ufl.SpatialCoordinate(self.domain)[1] - c["template_level"]
         )
         support = free_edge_energy_density(
             height, c["free_edge_load"], c["free_edge_width"], c["free_edge_clearance"]
         )
         energy += support * ds
+        functional = energy
+        if p.bending:
+            rigidity = c["young_modulus"] * c["thickness"] ** 3 / 12
+            bending, work = self._bending(rigidity)
+            functional = energy + work
+            energy = energy + bending if bending is not None else energy
         test, trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
-        residual = ufl.derivative(energy, self._state, test)
-        virtual = test if not p.bending else ufl.split(test)[0]
-        residual -= ufl.dot(pressure_force_density(gradient, c["pressure"]), virtual) * dx2
-        work = pressure_work_density(position, start, c["pressure"]) * dx2
+        residual = ufl.derivative(functional, self._state, test)
+        virtual, _ = self._split(test)
+        residual -= ufl.dot(pressure_force_density(gradient, c["pressure"]), virtual) * pressure_dx
+        work = pressure_work_density(position, start, c["pressure"]) * pressure_dx
         self._energy_form = compat.compile_form(energy)
         self._work_form = compat.compile_form(work)
         self._residual_form = compat.compile_form(residual)
         self._tangent_form = compat.compile_form(ufl.derivative(residual, self._state, trial))
         self._vector = fem_petsc.create_vector(self._residual_form)
         self._matrix = fem_petsc.create_matrix(self._tangent_form)
-        self.free_edge_stiffness = p.free_edge_stiffness
 
     def _edge_function(self, midpoints: Floats, dimension: int) -> tuple[Any, Ints]:
         """Crouzeix-Raviart vector function and the row of its array for each edge."""
@@ -180,7 +213,8 @@ class ShellModel:
         self._constants.value[_CONSTANTS[name]] = value
 
     def _split(self, function: Any) -> tuple[Any, Any]:
-        return ufl.split(function) if self.parameters.bending else (function, None)
+        """Positions and angles of a function or an argument of the space."""
+        return ufl.split(function)[:2] if self.parameters.bending else (function, None)
 
     # -- constants -------------------------------------------------------------------------
     @property
@@ -209,11 +243,38 @@ class ShellModel:
         self.directors = directors.copy()
         self._director.x.array.reshape(-1, 3)[self._director_rows] = directors
 
+    @property
+    def membrane_quadrature(self) -> int:
+        """Quadrature degree of the membrane energy."""
+        chosen = self.parameters.membrane_quadrature
+        return max(2 * self.parameters.degree - 2, 1) if chosen is None else chosen
+
+    @property
+    def node_areas(self) -> Floats:
+        """(n,) share of the template's area that goes with each node [mm^2]."""
+        return self.mesh.node_areas
+
     # -- assembly --------------------------------------------------------------------------
     @property
     def size(self) -> int:
         """Number of unknowns, constrained ones included."""
         return len(self._state.x.array)
+
+    def _put(self, function: Any, state: Floats) -> None:
+        function.x.array[:] = state
+
+    def _assembled_residual(self) -> Floats:
+        with self._vector.localForm() as local:
+            local.set(0.0)
+        fem_petsc.assemble_vector(self._vector, self._residual_form)
+        return self._vector.array.copy()
+
+    def _assembled_tangent(self) -> sp.csr_matrix:
+        self._matrix.zeroEntries()
+        fem_petsc.assemble_matrix(self._matrix, self._tangent_form)
+        self._matrix.assemble()
+        rows, columns, values = self._matrix.getValuesCSR()
+        return sp.csr_matrix((values, columns, rows), shape=self._matrix.size)
 
     def load_scale(self) -> float:
         """P x area of the template [mN]; residuals are given relative to it."""
@@ -221,31 +282,24 @@ class ShellModel:
 
     def energy(self, state: Floats) -> float:
         """Membrane, bending and free-edge energy [mN mm]."""
-        self._state.x.array[:] = state
+        self._put(self._state, state)
         return float(fem.assemble_scalar(self._energy_form))
 
     def pressure_work(self, state: Floats, base: Floats) -> float:
         """Work of the pressure on the straight way from ``base`` to ``state`` [mN mm]."""
-        self._state.x.array[:] = state
-        self._base.x.array[:] = base
+        self._put(self._state, state)
+        self._put(self._base, base)
         return float(fem.assemble_scalar(self._work_form))
 
     def residual(self, state: Floats) -> Floats:
         """Gradient of the energy minus the pressure force, (size,) [mN; mN mm for angles]."""
-        self._state.x.array[:] = state
-        with self._vector.localForm() as local:
-            local.set(0.0)
-        fem_petsc.assemble_vector(self._vector, self._residual_form)
-        return self._vector.array.copy()
+        self._put(self._state, state)
+        return self._assembled_residual()
 
     def tangent(self, state: Floats) -> sp.csr_matrix:
         """Derivative of :meth:`residual`, (size, size)."""
-        self._state.x.array[:] = state
-        self._matrix.zeroEntries()
-        fem_petsc.assemble_matrix(self._matrix, self._tangent_form)
-        self._matrix.assemble()
-        rows, columns, values = self._matrix.getValuesCSR()
-        return sp.csr_matrix((values, columns, rows), shape=(self.size, self.size))
+        self._put(self._state, state)
+        return self._assembled_tangent()
 
 
 def _part(vector: Any, place: int | slice) -> Any:
