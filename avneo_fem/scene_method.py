@@ -52,7 +52,7 @@ class Contact(Table):
     )
     omega: Positive = Field(0.5, description="omega of (3.3a)")
     steps: Annotated[int, Field(ge=1)] = Field(10, description="number of lambda steps, 0 to 1")
-    maximum_stiffness: Positive = Field(4096.0, description="eta_1 is not raised beyond [kPa]")
+    maximum_stiffness: Positive = Field(1e6, description="eta_1 is not raised beyond [kPa]")
 
 
 class Clamp(Table):
@@ -85,7 +85,7 @@ class Wall(Table):
     growth: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
         4.0, description="factor by which eta_1 is raised until the cusp is inside"
     )
-    maximum_stiffness: Positive = Field(4096.0, description="eta_1 is not raised beyond [kPa]")
+    maximum_stiffness: Positive = Field(1e6, description="eta_1 is not raised beyond [kPa]")
 
 
 class Mesh(Table):
@@ -126,6 +126,8 @@ class Solver(Table):
     barrier_stiffness: Positive = Field(
         0.05, description="self-contact stiffness in units of E H over barrier_distance squared"
     )
-    inside_tolerance: Positive = Field(
-        0.05, description="wedge and wall may be short of their clearance by [mm]"
+    inside_tolerance: Positive | None = Field(
+        None,
+        description="wedge and wall may be short of their clearance by [mm]; default 1 % of H, so"
+        " that cusps are 0.98 H apart",
     )

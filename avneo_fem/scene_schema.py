@@ -59,3 +59,8 @@ class Scene(Table):
     def mesh_size(self) -> float:
         """Target edge length after ``fidelity`` [mm]."""
         return self.mesh.size * FIDELITIES[self.fidelity]
+
+    def inside_tolerance(self, thickness: float) -> float:
+        """By how much a cusp of this thickness may be short of its clearances [mm]."""
+        chosen = self.solver.inside_tolerance
+        return 0.01 * thickness if chosen is None else chosen

@@ -17,8 +17,12 @@ __all__ = ["Material", "NeoHookean", "StVenantKirchhoff", "material_named"]
 class Material(Protocol):
     """What the membrane energy asks of a material."""
 
-    def strain_energy(self, right_cauchy_green: Any) -> Any:
-        """Strain energy per reference volume [kPa] of the in-plane C (2x2)."""
+    def strain_energy(self, right_cauchy_green: Any, square: Any = None) -> Any:
+        """Strain energy per reference volume [kPa] of the in-plane C (2x2).
+
+        ``square`` is J^2 where it is known better than as det C, whose digits cancel in a
+        squeezed triangle.
+        """
 
 
 @dataclass(frozen=True)
@@ -30,10 +34,11 @@ class StVenantKirchhoff:
 
     young_modulus: Any
 
-    def strain_energy(self, right_cauchy_green: Any) -> Any:
+    def strain_energy(self, right_cauchy_green: Any, square: Any = None) -> Any:
         """psi(C) [kPa]."""
         first = ufl.tr(right_cauchy_green)
-        return self.young_modulus / 8 * ((first - 1) ** 2 - 2 * ufl.det(right_cauchy_green) + 1)
+        square = ufl.det(right_cauchy_green) if square is None else square
+        return self.young_modulus / 8 * ((first - 1) ** 2 - 2 * square + 1)
 
 
 @dataclass(frozen=True)
@@ -45,10 +50,11 @@ class NeoHookean:
 
     young_modulus: Any
 
-    def strain_energy(self, right_cauchy_green: Any) -> Any:
+    def strain_energy(self, right_cauchy_green: Any, square: Any = None) -> Any:
         """psi(C) [kPa]."""
         first = ufl.tr(right_cauchy_green)
-        return self.young_modulus / 4 * (first - 2 - ufl.ln(ufl.det(right_cauchy_green)))
+        square = ufl.det(right_cauchy_green) if square is None else square
+        return self.young_modulus / 4 * (first - 2 - ufl.ln(square))
 
 
 def material_named(model: str, young_modulus: Any) -> Material:

@@ -69,7 +69,7 @@ def tolerances_of(scene: Scene, geometry: ValveGeometry) -> Tolerances:
     edges_apart = 2 * radius * np.sin(gap / (2 * radius))
     return Tolerances(
         residual=scene.solver.tolerance,
-        inside_mm=scene.solver.inside_tolerance,
+        inside_mm=scene.inside_tolerance(2 * halves[0]),
         clamp_deg=scene.clamp.tolerance_degrees if scene.material.bending else np.inf,
         cusp_distance_mm=min(wedge, float(edges_apart)),
         wall_distance_mm=max(

@@ -354,7 +354,8 @@ class CuspSuturing:
     def _raise_until_inside(self, state: Floats) -> Floats:
         """Raise the penalties until clearances and clamp hold, then converge (§3.4 step 3)."""
         setup, scene = self.setup, self.setup.scene
-        inside = self.options.inside_tolerance
+        # less than what is judged: the judge also looks between the nodes
+        inside = 0.5 * scene.inside_tolerance(setup.cusp.thickness)
         allowed = (inside, inside, scene.clamp.tolerance_degrees)
         terms: list[SignedDistancePenalty | ClampPenalty] = [setup.wall, setup.wedge, setup.clamp]
         limits = (
@@ -372,9 +373,11 @@ class CuspSuturing:
                     return state
                 continue
             raised = False
-            for term, limit, behind in zip(terms, limits, late, strict=True):
-                if behind and term.stiffness < limit:
-                    term.stiffness = min(limit, scene.wall.growth * term.stiffness)
+            for term, limit, miss, most in zip(terms, limits, misses, allowed, strict=True):
+                if miss > most and term.stiffness < limit:
+                    # no more than is missing: stiff penalties cost digits
+                    factor = min(scene.wall.growth, 1.3 * miss / most)
+                    term.stiffness = min(limit, factor * term.stiffness)
                     raised = True
             if not raised:
                 state = self._converge(state, "equilibrium", self.options.tolerance)
