@@ -47,6 +47,7 @@ __all__ = [
     "PETSC_ERROR",
     "PETSc",
     "cell_areas",
+    "cell_corners",
     "cell_dofs",
     "clear_stale_kernels",
     "compile_form",
@@ -253,11 +254,16 @@ def vector_nodes(space: Any, degree: int) -> tuple[NDArray[np.int64], NDArray[np
     return triples, projected[triples[:, :2]]
 
 
-def cell_areas(domain: Any) -> NDArray[np.float64]:
-    """(m,) areas of the triangles in DOLFINx's own order."""
+def cell_corners(domain: Any) -> NDArray[np.float64]:
+    """(m, 3, 2) corners of the triangles in DOLFINx's own order."""
     table = domain.geometry.dofmap
     nodes = np.asarray(getattr(table, "array", table)).reshape(-1, 3)
-    a, b, c = (domain.geometry.x[nodes[:, k], :2] for k in range(3))
+    return np.asarray(domain.geometry.x[nodes, :2])
+
+
+def cell_areas(domain: Any) -> NDArray[np.float64]:
+    """(m,) areas of the triangles in DOLFINx's own order."""
+    a, b, c = cell_corners(domain).transpose(1, 0, 2)
     u, v = b - a, c - a
     return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 

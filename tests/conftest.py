@@ -6,10 +6,10 @@ from typing import Any
 from unittest import mock
 
 import pytest
-from run_cases import FAILING, SMALL, SMALL_ALL, VERIFIED, Run, suture, suture_inside
 
 from avneo_fem import run as run_module
 from avneo_fem.results.pictures import PictureError
+from run_cases import FAILING, SMALL, SMALL_ALL, VERIFIED, Run, suture, suture_inside
 
 
 @pytest.fixture(scope="session")

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from functools import cache
 
-from valve_cases import experiment
-
 from avneo_fem.geometry.template import CuspTemplate
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.scene import Template
+from valve_cases import experiment
 
 TEMPLATES = {
     "experiment 1": CuspTemplate(Template()),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shell_cases import taylor_orders
 
 from avneo_fem.constraints.term import Term
+from shell_cases import taylor_orders
 
 
 def check_derivatives(term: Term, points: np.ndarray, direction: np.ndarray) -> None:

@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
+
+from avneo_fem.equilibrium.directors import renew_directors
+from avneo_fem.equilibrium.shell_model import ShellModel
+from avneo_fem.meshing.cusp_mesh import CuspMesh
 from shell_cases import (
     BENDING_ALONE,
     Floats,
@@ -20,10 +24,6 @@ from shell_cases import (
     taylor_orders,
     unit_direction,
 )
-
-from avneo_fem.equilibrium.directors import renew_directors
-from avneo_fem.equilibrium.shell_model import ShellModel
-from avneo_fem.meshing.cusp_mesh import CuspMesh
 
 MATERIALS = ["neo_hookean", "st_venant_kirchhoff"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from term_cases import check_derivatives
 
 from avneo_fem.constraints.clamp_penalty import ClampPenalty
+from term_cases import check_derivatives
 
 EDGES = np.array([[[0.0, 0, 0], [2.0, 0, 0]], [[2.0, 0, 0], [3.0, 1.0, 0]]])
 CONORMAL = np.array([[0.0, -1, 0], [1.0, -1.0, 0.5]])

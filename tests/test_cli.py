@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_cases import SMALL, Run, avneo, avneo_inside, environment, written
-from valve_cases import DEMOS
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.results.report import geometry_report, to_json
 from avneo_fem.results.surfaces import read_stl, write_stl
 from avneo_fem.scene import load_scene
+from run_cases import SMALL, Run, avneo, avneo_inside, environment, written
+from valve_cases import DEMOS
 
 #: Scenes no one can build: TOML text, then what the message must say of key = value, and of what
 #: would be valid.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from commissure_cases import random_triangles
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.commissure import commissure_angles
 from avneo_fem.geometry.commissure_plane import CommissurePlane
+from commissure_cases import random_triangles
 
 
 def test_plane_coordinates() -> None:

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shell_cases import disc
 
 from avneo_fem import compat
 from avneo_fem.compat import fem, ufl
+from shell_cases import disc
 
 CHILD = """
 import json, logging, os, sys, warnings

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from valve_cases import SCENES, build, experiment, quasi_optimal
 
 from avneo_fem.errors import SceneError
+from valve_cases import SCENES, build, experiment, quasi_optimal
 
 
 def test_competent_and_not() -> None:

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_cases import SMALL, Run
-from valve_cases import DEMOS
 
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.scene import load_scene, parse_scene
 from avneo_fem.stages.record import CuspResult, Snapshot, StageRecord
 from avneo_fem.valve.congruence import representatives, rotate_result
+from run_cases import SMALL, Run
+from valve_cases import DEMOS
 
 
 def of(scene: dict[str, Any]) -> tuple[int, int, int]:

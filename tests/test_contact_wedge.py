@@ -4,14 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_wedge_cases import (
-    EXPERIMENTS,
-    brute_distance,
-    commissures,
-    inputs,
-    inside,
-    triple_point,
-)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -20,6 +12,14 @@ from avneo_fem.errors import SceneError
 from avneo_fem.geometry.commissure_plane import CommissurePlane
 from avneo_fem.geometry.contact_curve import curve_length
 from avneo_fem.geometry.contact_wedge import ContactWedge, ContactWedgeFamily
+from contact_wedge_cases import (
+    EXPERIMENTS,
+    brute_distance,
+    commissures,
+    inputs,
+    inside,
+    triple_point,
+)
 
 
 def _family(points, centre, lengths):

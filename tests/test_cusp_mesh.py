@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from mesh_cases import TEMPLATES, mesh_of
 
 from avneo_fem.meshing.cusp_mesh import CuspMesh
+from mesh_cases import TEMPLATES, mesh_of
 
 SQUARE = CuspMesh(
     points=np.array([[0.0, 2.0], [0.0, 0.0], [3.0, 0.0], [3.0, 2.0]]),

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_cases import SMALL
 from scipy.spatial.distance import pdist
 
 from avneo_fem.geometry.valve_input import ValveInput
@@ -15,6 +14,7 @@ from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.results.crossings import self_intersections
 from avneo_fem.scene import Scene, parse_scene
 from avneo_fem.stages.cusp_setup import CuspSetup, clearances, near_suture
+from run_cases import SMALL
 
 
 def made(index: int = 1, **tables: Any) -> CuspSetup:

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from avneo_fem.constraints.proximal import ProximalTerm
+from avneo_fem.constraints.self_contact import SelfContact
+from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
+from avneo_fem.equilibrium.cusp_system import CuspSystem
+from avneo_fem.equilibrium.shell_model import ShellModel
 from shell_cases import (
     disc,
     flat,
@@ -15,12 +21,6 @@ from shell_cases import (
     taylor_orders,
     unit_direction,
 )
-
-from avneo_fem.constraints.proximal import ProximalTerm
-from avneo_fem.constraints.self_contact import SelfContact
-from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
-from avneo_fem.equilibrium.cusp_system import CuspSystem
-from avneo_fem.equilibrium.shell_model import ShellModel
 
 BENDING = [True, False]
 

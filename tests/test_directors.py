@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
-from shell_cases import disc, flat, renumbered, rotation, rough, shell, state_at, strip
 
 from avneo_fem.equilibrium.directors import (
     clamp_rotation,
@@ -14,6 +13,7 @@ from avneo_fem.equilibrium.directors import (
     start_directors,
 )
 from avneo_fem.equilibrium.shell_model import ShellModel
+from shell_cases import disc, flat, renumbered, rotation, rough, shell, state_at, strip
 
 
 def edge_vectors(model: ShellModel, state: np.ndarray) -> np.ndarray:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import ufl
-from shell_cases import disc, evaluated, rotation
 
 from avneo_fem.errors import SceneError
 from avneo_fem.mechanics.materials import material_named
 from avneo_fem.results.fields import principal_stresses, principal_stretches
+from shell_cases import disc, evaluated, rotation
 
 MODELS = ["neo_hookean", "st_venant_kirchhoff"]
 

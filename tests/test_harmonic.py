@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shell_cases import disc, renumbered, strip
-from valve_cases import build
 
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.harmonic import harmonic_extension
 from avneo_fem.meshing.triangulate import triangulate_template
+from shell_cases import disc, renumbered, strip
+from valve_cases import build
 
 
 def cusp(size: float) -> CuspMesh:

@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from avneo_fem.equilibrium.directors import renew_directors, start_directors, turn_directors
+from avneo_fem.equilibrium.high_order_shell import HighOrderShell, shell_model
+from avneo_fem.equilibrium.shell_model import ShellModel, ShellParameters
+from avneo_fem.meshing.cusp_mesh import CuspMesh
 from shell_cases import (
     BENDING_ALONE,
     Floats,
@@ -17,11 +22,6 @@ from shell_cases import (
     taylor_orders,
     unit_direction,
 )
-
-from avneo_fem.equilibrium.directors import renew_directors, start_directors, turn_directors
-from avneo_fem.equilibrium.high_order_shell import HighOrderShell, shell_model
-from avneo_fem.equilibrium.shell_model import ShellModel, ShellParameters
-from avneo_fem.meshing.cusp_mesh import CuspMesh
 
 DEGREES = [2, 3]
 

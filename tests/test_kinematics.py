@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shell_cases import evaluated, rotation
 
 from avneo_fem.compat import ufl
 from avneo_fem.mechanics.kinematics import (
@@ -13,6 +12,7 @@ from avneo_fem.mechanics.kinematics import (
     surface_stretch,
     unit_normal,
 )
+from shell_cases import evaluated, rotation
 
 
 def gradient(seed: int) -> np.ndarray:

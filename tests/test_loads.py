@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from avneo_fem.compat import ufl
+from avneo_fem.equilibrium.shell_model import ShellModel
+from avneo_fem.mechanics.loads import free_edge_energy_density, pressure_force_density
+from avneo_fem.meshing.cusp_mesh import CuspMesh
 from shell_cases import (
     FREE_EDGE_ALONE,
     PRESSURE_ALONE,
@@ -20,11 +25,6 @@ from shell_cases import (
     taylor_orders,
     unit_direction,
 )
-
-from avneo_fem.compat import ufl
-from avneo_fem.equilibrium.shell_model import ShellModel
-from avneo_fem.mechanics.loads import free_edge_energy_density, pressure_force_density
-from avneo_fem.meshing.cusp_mesh import CuspMesh
 
 P = 8.0
 BENDING = [True, False]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shell_cases import evaluated
 
 from avneo_fem.compat import ufl
 from avneo_fem.errors import SceneError
 from avneo_fem.mechanics.materials import NeoHookean, StVenantKirchhoff, material_named
+from shell_cases import evaluated
 
 E = 1000.0
 STRETCHES = np.array([0.3, 0.577, 0.9, 1.0, 1.2, 2.0])

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from avneo_fem.compat import ufl
+from avneo_fem.mechanics.materials import NeoHookean, StVenantKirchhoff
+from avneo_fem.mechanics.membrane import membrane_energy_density
 from shell_cases import (
     MEMBRANE_ALONE,
     disc,
@@ -17,10 +21,6 @@ from shell_cases import (
     taylor_orders,
     unit_direction,
 )
-
-from avneo_fem.compat import ufl
-from avneo_fem.mechanics.materials import NeoHookean, StVenantKirchhoff
-from avneo_fem.mechanics.membrane import membrane_energy_density
 
 VARIANTS = [
     {"bending": False, "material": "neo_hookean"},

@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from shell_cases import disc, flat, hairpin, shell, state_at, strip
 
 from avneo_fem.constraints.proximal import ProximalTerm
 from avneo_fem.constraints.self_contact import SelfContact
 from avneo_fem.equilibrium.cusp_system import CuspSystem
 from avneo_fem.equilibrium.newton import NewtonSettings, NewtonSolver, Verdict
+from shell_cases import disc, flat, hairpin, shell, state_at, strip
 
 Case = tuple[CuspSystem, np.ndarray]
 

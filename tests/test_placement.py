@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from valve_cases import experiment
 
 from avneo_fem.errors import SceneError
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.stages.placement import pierces, place_template
+from valve_cases import experiment
 
 SHEET = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])

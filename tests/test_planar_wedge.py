@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_wedge_cases import bezier, brute_distance, inside
 
 from avneo_fem.geometry.bezier_arcs import CUTS
 from avneo_fem.geometry.planar_wedge import PlanarWedge
+from contact_wedge_cases import bezier, brute_distance, inside
 
 THIRDS = np.arange(4.0)[:, None] / 3.0
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shell_cases import Floats, flat, shell, state_at, strip
 
 from avneo_fem.constraints.self_contact import SelfContact
 from avneo_fem.equilibrium.cusp_system import CuspSystem
 from avneo_fem.equilibrium.newton import NewtonSettings, NewtonSolver, Verdict
 from avneo_fem.equilibrium.relaxation import Relaxation, RelaxationSettings
+from shell_cases import Floats, flat, shell, state_at, strip
 
 #: E H / L^2 of the strip below [kPa/mm]
 UNIT = 1000.0 * 0.5 / 4.0

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from valve_cases import DEMOS
 
 from avneo_fem import __version__
 from avneo_fem.geometry.valve_input import ValveInput
@@ -17,6 +16,7 @@ from avneo_fem.results.report import build_report, geometry_report, to_json, wri
 from avneo_fem.results.verdict import CuspVerification, ValveVerification
 from avneo_fem.scene import load_scene, parse_scene
 from avneo_fem.stages.record import CuspResult, StageRecord
+from valve_cases import DEMOS
 
 TABLE: dict[int, dict[str, Any]] = {
     1: {"J": [0.5315] * 3, "c": [19.5] * 3, "nu": 0.6153, "sigma": [1.2387] * 3},

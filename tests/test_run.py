@@ -14,8 +14,6 @@ import numpy as np
 import pytest
 import pyvista
 from matplotlib.image import imread
-from run_cases import SMALL, Run, avneo_inside, command, environment, suture_inside, written
-from valve_cases import DEMOS
 
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.results.containment import outside_root_mm, outside_wedge_mm
@@ -24,6 +22,8 @@ from avneo_fem.results.report import geometry_report, to_json
 from avneo_fem.results.surfaces import read_stl
 from avneo_fem.results.verification_input import constraints_of
 from avneo_fem.scene import load_scene, parse_scene
+from run_cases import SMALL, Run, avneo_inside, command, environment, suture_inside, written
+from valve_cases import DEMOS
 
 FILES = ["cusp_0.stl", "cusp_1.stl", "cusp_2.stl", "report.json", "valve.h5", "valve.png"]
 FILES += ["valve.xdmf"]

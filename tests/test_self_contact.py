@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from term_cases import check_derivatives
 
 from avneo_fem.constraints.self_contact import SelfContact
+from term_cases import check_derivatives
 
 DISTANCE = 0.2
 KAPPA = 50.0

@@ -6,6 +6,11 @@ from itertools import count
 
 import numpy as np
 import pytest
+
+from avneo_fem.compat import kernel_cache, ufl
+from avneo_fem.equilibrium.directors import current_directors
+from avneo_fem.equilibrium.shell_model import ShellModel
+from avneo_fem.meshing.cusp_mesh import CuspMesh
 from shell_cases import (
     Floats,
     disc,
@@ -19,11 +24,6 @@ from shell_cases import (
     taylor_orders,
     unit_direction,
 )
-
-from avneo_fem.compat import kernel_cache, ufl
-from avneo_fem.equilibrium.directors import current_directors
-from avneo_fem.equilibrium.shell_model import ShellModel
-from avneo_fem.meshing.cusp_mesh import CuspMesh
 
 VARIANTS = [
     {"material": "neo_hookean", "bending": True},

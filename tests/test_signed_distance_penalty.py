@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from term_cases import check_derivatives
-from valve_cases import experiment
 
 from avneo_fem.constraints.signed_distance_penalty import SignedDistance, SignedDistancePenalty
 from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
 from avneo_fem.geometry.root import CylinderRoot
+from term_cases import check_derivatives
+from valve_cases import experiment
 
 RADIUS = 12.0
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_cases import SMALL, SMALL_ALL, Run, command, environment, suture_inside, written
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.valve_input import ValveInput
@@ -16,6 +15,7 @@ from avneo_fem.scene import parse_scene
 from avneo_fem.stages.record import CuspResult
 from avneo_fem.valve import suture_valve as module
 from avneo_fem.valve.suture_valve import mesh_templates, suture_valve
+from run_cases import SMALL, SMALL_ALL, Run, command, environment, suture_inside, written
 
 UNEQUAL = {"cusp": [{"template": {"thickness": 0.4}}, {}, {}]}
 

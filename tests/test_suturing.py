@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from run_cases import FAILING, SMALL
 
 from avneo_fem.equilibrium.directors import clamp_rotation
 from avneo_fem.geometry.valve_input import ValveInput
@@ -22,6 +21,7 @@ from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.record import StageRecord
 from avneo_fem.stages.suturing import CuspSuturing
+from run_cases import FAILING, SMALL
 
 LAMBDAS = [0.0, 0.25, 0.5, 0.75, 1.0]
 

@@ -10,13 +10,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from mesh_cases import TEMPLATES, mesh_of
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.template import CuspTemplate
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.scene import Template
+from mesh_cases import TEMPLATES, mesh_of
 
 SIZES = (3.0, 1.4, 0.7, 0.5)
 

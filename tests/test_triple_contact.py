@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from commissure_cases import random_triangles, sides
 
 from avneo_fem.geometry.commissure import contact_lengths, quasi_optimal_lengths
 from avneo_fem.geometry.commissure_plane import CommissurePlane
 from avneo_fem.geometry.triple_contact import triple_contact_point, triple_contact_points
+from commissure_cases import random_triangles, sides
 
 Batch = tuple[np.ndarray, np.ndarray]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from valve_cases import DEMOS, build, experiment
 
 from avneo_fem.errors import SceneError
 from avneo_fem.scene import load_scene
+from valve_cases import DEMOS, build, experiment
 
 TABLE: dict[int, tuple[list[float], list[float], float]] = {
     1: ([0.5315] * 3, [19.5] * 3, 0.6153),

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from valve_cases import DEMOS
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.scene import load_scene, parse_scene
+from valve_cases import DEMOS
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from valve_cases import DEMOS
 
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.triangulate import triangulate_template
@@ -16,6 +15,7 @@ from avneo_fem.results.measures import clamp_error_deg, free_edge_sag_mm, suture
 from avneo_fem.results.verification_input import constraints_of, surface_of, tolerances_of
 from avneo_fem.scene import load_scene, parse_scene
 from avneo_fem.stages.record import CuspResult
+from valve_cases import DEMOS
 
 
 def demo(number: int) -> ValveInput:

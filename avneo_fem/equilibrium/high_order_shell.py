@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -42,6 +44,9 @@ class HighOrderShell(ShellModel):
     are given at the nodes, (n, 3).
     """
 
+    _curvature_at: Floats | None = None
+    _places: tuple[Any, ...] | None = None
+
     def _make_space(self, degree: int) -> None:
         element = compat.vector_element(self.domain, "Lagrange", 3, degree)
         node_space = compat.function_space(self.domain, element)
@@ -53,22 +58,19 @@ class HighOrderShell(ShellModel):
             places = self._unknowns.reshape(-1, 3)
         else:
             trace = compat.edge_trace_element(self.domain, degree - 1)
-            moment = compat.scalar_element(self.domain, "DG", degree - 1)
-            # one space for all: DOLFINx 0.5.2 gets facet integrals of a rectangular form wrong
-            parts = [element, trace, moment, moment, moment]
-            self.space = compat.mixed_space(self.domain, parts)
+            self.space = compat.mixed_space(self.domain, [element, trace])
             self._trace_space, trace_map = self.space.sub(1).collapse()
-            self._moments = compat.dofs_of_parts(self.space, [2, 3, 4])
             of_edges = compat.edge_dofs(self._trace_space, degree)
             middle = self.mesh.points[self.mesh.edges].mean(axis=1)
             self._trace_dofs = of_edges[compat.match_edges(self.domain, middle)]
             angles = np.asarray(trace_map)[self._trace_dofs]
             every = np.arange(len(fem.Function(self.space).x.array))
             idle = np.setdiff1d(trace_map, angles)  # inside the cells, without a trace
-            self._unknowns = np.setdiff1d(every, np.r_[self._moments, idle])
+            self._unknowns = np.setdiff1d(every, idle)
             number = np.full(len(every), -1)
             number[self._unknowns] = np.arange(len(self._unknowns))
             self.angle_dofs = number[angles]
+            self._gradient = self._edge_gradients()
             self._director = fem.Function(node_space)
             self._other_director = fem.Function(node_space)
             triples, where = compat.vector_nodes(self.space, degree)
@@ -87,6 +89,7 @@ class HighOrderShell(ShellModel):
     def set_directors(self, directors: Floats) -> None:
         """Reference directors p at the nodes, (n, 3) unit vectors."""
         self.directors = directors.copy()
+        self._curvature_at = None
         self._director.x.array.reshape(-1, 3)[self._node_rows] = directors
 
     @cached_property
@@ -99,54 +102,93 @@ class HighOrderShell(ShellModel):
         return np.asarray(shares, float)
 
     # -- bending ---------------------------------------------------------------------------
-    def _facets(self, kind: str) -> Any:
-        metadata = {"quadrature_degree": 2 * self.parameters.degree - 1}
-        return ufl.Measure(kind, domain=self.domain, metadata=metadata)
+    def _around_cells(self, integrand: Callable[[Any], Any]) -> Any:
+        """Integral over the boundaries of all cells; ``integrand`` takes the outward normal nu.
 
-    def _around_cells(self, integrand: Any) -> Any:
-        """Integral over the boundaries of all cells; ``integrand`` takes a restriction."""
-        inner, outer = self._facets("dS"), self._facets("ds")
-        both = integrand(lambda f: f("+")) + integrand(lambda f: f("-"))
-        return both * inner + integrand(lambda f: f) * outer
-
-    def _bending(self, rigidity: Any) -> tuple[Any, Any]:
+        A cell integral with points on the edges: a facet integral would couple all unknowns of
+        both cells, though an edge's angle sees one cell at a time.
+        """
         degree = self.parameters.degree
-        position, rotation, *components = ufl.split(self._state)
-        moment, normal = ufl.as_vector(components), ufl.FacetNormal(self.domain)
+        shares, weights = np.polynomial.legendre.leggauss(degree)
+        along = (1 + shares[:, None]) / 2
+        corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        points = np.vstack([(1 - along) * a + along * b for a, b in combinations(corners, 2)])
+        metadata = {
+            "quadrature_rule": "custom",
+            "quadrature_degree": 2 * degree - 1,
+            # tuples: of an array UFL would put a rounded text into the form's signature
+            "quadrature_points": tuple(tuple(map(float, point)) for point in points),
+            "quadrature_weights": tuple(map(float, np.tile(weights / 2, 3))),
+        }
+        measure = ufl.Measure("dx", domain=self.domain, metadata=metadata)
+        # the barycentric gradient of an edge has its length over twice the area
+        steepness = ufl.sqrt(ufl.dot(self._gradient, self._gradient))
+        return steepness * integrand(-self._gradient / steepness) * measure
+
+    def _edge_gradients(self) -> Any:
+        """Function that is grad lambda_e at the Gauss points of every edge e of a cell, where
+        the barycentric coordinate lambda_e vanishes.
+
+        The Legendre polynomial P_k(1 - 2 lambda_e) is 1 on e and 0 at the points of the others.
+        One rule for the three edges, and not three: FFCx 0.5.2 takes a shape function that is
+        constant on one edge for the same constant on the next.
+        """
+        degree = self.parameters.degree
+        element = compat.vector_element(self.domain, "DG", 2, degree)
+        function = fem.Function(compat.function_space(self.domain, element))
+        nodes = function.function_space.tabulate_dof_coordinates()[:, :2]
+        of_cells = compat.cell_dofs(function.function_space)
+        corners = compat.cell_corners(self.domain)
+        across = np.roll(corners, 1, axis=1) - np.roll(corners, 2, axis=1)
+        gradients = np.stack([-across[..., 1], across[..., 0]], axis=2)
+        heights = np.einsum("ced,ced->ce", corners - np.roll(corners, 1, axis=1), gradients)
+        gradients /= heights[..., None]
+        away = nodes[of_cells][:, :, None] - np.roll(corners, 1, axis=1)[:, None]
+        coordinate = np.einsum("cned,ced->cne", away, gradients)
+        share = np.polynomial.legendre.Legendre.basis(degree)(1 - 2 * coordinate)
+        values = np.einsum("cne,ced->cnd", share, gradients)
+        function.x.array.reshape(-1, 2)[of_cells] = values
+        return function
+
+    def _bending(self, rigidity: Any, test: Any) -> tuple[Any, Any]:
+        degree = self.parameters.degree
+        space = compat.mixed_space(
+            self.domain, [compat.scalar_element(self.domain, "DG", degree - 1)] * 3
+        )
+        self._moment = fem.Function(space)
+        position, rotation = ufl.split(self._state)
+        moment = ufl.as_vector(ufl.split(self._moment))
         work = self._around_cells(
-            lambda side: moment_on_edges(
-                side(position), side(rotation), side(self._director), side(moment), side(normal)
-            )
+            lambda normal: moment_on_edges(position, rotation, self._director, moment, normal)
         )
         if degree > 1:
             work += moment_on_cells(position, moment) * self._dx(2 * degree - 1)
-        space = self._moment_space = compat.mixed_space(
-            self.domain, [compat.scalar_element(self.domain, "DG", degree - 1)] * 3
-        )
-        test, trial = ufl.TestFunction(space), ufl.TrialFunction(space)
-        mass = ufl.inner(symmetric(test), symmetric(trial)) * self._dx(2 * degree - 2)
-        self._unit_compliance, self._root = self._inverse_mass(compat.compile_form(mass))
-        return None, work
+        moment_test, moment_trial = ufl.TestFunction(space), ufl.TrialFunction(space)
+        mass = ufl.inner(symmetric(moment_test), symmetric(moment_trial))
+        force = self._moment_force(work, test)
+        self._curvature_form = compat.compile_form(ufl.derivative(work, self._moment, moment_test))
+        # rows for the state: with the moments there, DOLFINx 0.5.2 turns the wrong edges' signs
+        self._slope_form = compat.compile_form(ufl.derivative(force, self._moment, moment_trial))
+        self._slope_matrix = fem_petsc.create_matrix(self._slope_form)
+        self._moments = compat.cell_dofs(space)
+        self._invert_mass(compat.compile_form(mass * self._dx(2 * degree - 2)))
+        return None, force
 
-    def _inverse_mass(self, form: Any) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-        """Inverse of the block-diagonal mass matrix of the moments, and R with R^T R = it.
+    def _moment_force(self, work: Any, test: Any) -> Any:
+        """Variation of the work of the moments with the state."""
+        return ufl.derivative(work, self._state, test)
 
-        Rows and columns run cell by cell, as ``self._moments`` does.
-        """
+    def _invert_mass(self, form: Any) -> None:
+        """Inverse blocks of the mass matrix of the moments cell by cell, and roots R^T R = it."""
         matrix = fem_petsc.assemble_matrix(form)
         matrix.assemble()
         rows, columns, values = matrix.getValuesCSR()
-        dofs = compat.cell_dofs(self._moment_space)
-        mass = sp.csr_matrix((values, columns, rows))[dofs.ravel()][:, dofs.ravel()]
-        cells, count = dofs.shape
-        here = np.arange(cells * count).reshape(cells, count)
-        places = np.repeat(here, count, 1).ravel(), np.tile(here, (1, count)).ravel()
+        mass = sp.csr_matrix((values, columns, rows))
+        cells, count = self._moments.shape
+        places = np.repeat(self._moments, count, 1).ravel(), np.tile(self._moments, count).ravel()
         blocks = np.linalg.inv(np.asarray(mass[places]).reshape(cells, count, count))
-        upper = np.linalg.cholesky(blocks).transpose(0, 2, 1)
-        return (
-            sp.csr_matrix((blocks.ravel(), places), shape=mass.shape),
-            sp.csr_matrix((upper.ravel(), places), shape=mass.shape),
-        )
+        self._unit_compliance: Floats = blocks
+        self._root: Floats = np.linalg.cholesky(blocks).transpose(0, 2, 1)
 
     @property
     def rigidity(self) -> float:
@@ -162,28 +204,37 @@ class HighOrderShell(ShellModel):
         function.x.array[self._unknowns] = state
 
     def _curvature(self) -> Floats:
-        """Curvature of the present state tested with the moments."""
-        return self._assembled_residual()[self._moments]
+        """(m, q) curvature of the present state tested with the moments of each cell.
+
+        Kept until state or directors change: a Newton step asks three times at the same state.
+        """
+        state = self._state.x.array
+        if self._curvature_at is None or not np.array_equal(self._curvature_at, state):
+            vector = fem_petsc.assemble_vector(self._curvature_form)
+            self._kept_curvature: Floats = vector.array_r[self._moments]
+            self._curvature_at = state.copy()
+            vector.destroy()
+        return self._kept_curvature
 
     def _update_moments(self, state: Floats) -> None:
         self._put(self._state, state)
-        self._state.x.array[self._moments] = self.rigidity * (
-            self._unit_compliance @ self._curvature()
-        )
+        strain = np.einsum("cij,cj->ci", self._unit_compliance, self._curvature())
+        self._moment.x.array[self._moments] = self.rigidity * strain
 
     def energy(self, state: Floats) -> float:
         """Membrane, bending and free-edge energy [mN mm]."""
         total = super().energy(state)
         if not self.parameters.bending:
             return total
-        curvature = self._curvature()
-        return total + float(self.rigidity / 2 * curvature @ (self._unit_compliance @ curvature))
+        self._update_moments(state)
+        return total + float(np.vdot(self._moment.x.array[self._moments], self._curvature()) / 2)
 
     def residual(self, state: Floats) -> Floats:
         """Gradient of the energy minus the pressure force, (size,)."""
-        if not self.parameters.bending:
-            return super().residual(state)
-        self._update_moments(state)
+        if self.parameters.bending:
+            self._update_moments(state)
+        else:
+            self._put(self._state, state)
         return self._assembled_residual()[self._unknowns]
 
     def tangent(self, state: Floats) -> sp.csr_matrix:
@@ -192,9 +243,26 @@ class HighOrderShell(ShellModel):
             return super().tangent(state)
         self._update_moments(state)
         whole = self._assembled_tangent()
-        at_fixed_moments = whole[self._unknowns][:, self._unknowns]
-        variation = self._root @ whole[self._moments][:, self._unknowns]
-        return (at_fixed_moments + self.rigidity * (variation.T @ variation)).tocsr()
+        self._slope_matrix.zeroEntries()
+        fem_petsc.assemble_matrix(self._slope_matrix, self._slope_form)
+        self._slope_matrix.assemble()
+        slopes = self._slope_matrix.getValuesCSR()
+        if self._places is None:
+            self._places = self._find_places(whole, slopes)
+        of_slopes, of_blocks, kept, indices, starts = self._places
+        variation = slopes[2][of_slopes] @ self._root.transpose(0, 2, 1)
+        blocks = self.rigidity * (variation @ variation.transpose(0, 2, 1))
+        values = whole.data + np.bincount(of_blocks, blocks.ravel(), minlength=whole.nnz)
+        return sp.csr_matrix((values[kept], indices, starts), shape=(self.size, self.size))
+
+    def _find_places(self, whole: sp.csr_matrix, slopes: Any) -> tuple[Any, ...]:
+        """Where the entries of the cells stand in the assembled matrices, whose patterns stay."""
+        dofs, moments = compat.cell_dofs(self.space), self._moments
+        of_slopes = _places_in(slopes[0], slopes[1], dofs, moments)
+        of_blocks = _places_in(whole.indptr, whole.indices, dofs, dofs)
+        order = sp.csr_matrix((np.arange(whole.nnz), whole.indices, whole.indptr), whole.shape)
+        kept = order[self._unknowns][:, self._unknowns]
+        return of_slopes, of_blocks.ravel(), kept.data, kept.indices, kept.indptr
 
     # -- directors -------------------------------------------------------------------------
     def unit_rotations(self) -> Floats:
@@ -228,23 +296,15 @@ class HighOrderShell(ShellModel):
         """Factorised mass matrix of the edge angles, and the form of their change on renewal."""
         test, trial = ufl.TestFunction(self._trace_space), ufl.TrialFunction(self._trace_space)
         position, _ = self._split(self._state)
-        normal = ufl.FacetNormal(self.domain)
 
         def along(field: Any, nu: Any) -> Any:
             return ufl.dot(field, ufl.as_vector([-nu[1], nu[0]]))
 
-        mass = self._around_cells(
-            lambda side: along(side(test), side(normal)) * along(side(trial), side(normal))
-        )
+        mass = self._around_cells(lambda normal: along(test, normal) * along(trial, normal))
         change = self._around_cells(
-            lambda side: (
-                angle_between(
-                    ufl.grad(side(position)),
-                    side(self._other_director),
-                    side(self._director),
-                    side(normal),
-                )
-                * along(side(test), side(normal))
+            lambda normal: (
+                angle_between(ufl.grad(position), self._other_director, self._director, normal)
+                * along(test, normal)
             )
         )
         matrix = fem_petsc.assemble_matrix(compat.compile_form(mass))
@@ -278,3 +338,16 @@ class HighOrderShell(ShellModel):
         )
         self.set_directors(fresh)
         return result
+
+
+def _places_in(starts: Ints, columns: Ints, row: Ints, column: Ints) -> Ints:
+    """(m, r, c) where the entries of every cell's ``row`` (m, r) and ``column`` (m, c) stand in
+    the values of a CSR matrix with sorted columns."""
+    rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    width = int(columns.max()) + 1
+    keys = rows * width + columns
+    wanted = row[:, :, None] * width + column[:, None, :]
+    places = np.searchsorted(keys, wanted)
+    if not np.array_equal(keys[np.minimum(places, len(keys) - 1)], wanted):
+        raise RuntimeError("an entry of a cell is missing in the assembled matrix")
+    return places

@@ -148,14 +148,14 @@ class ShellModel:
         self.position_dofs: Ints = np.asarray(position_map, dtype=np.int64)[blocks]
         self.node_points = points
 
-    def _bending(self, rigidity: Any) -> tuple[Any, Any]:
-        """Bending energy, and the functional whose derivative is its force (here the same)."""
+    def _bending(self, rigidity: Any, test: Any) -> tuple[Any, Any]:
+        """Bending energy (None: not a form) and its residual, a linear form in ``test``."""
         position, angle = self._split(self._state)
         density = bending_energy_density(
             self.domain, position, angle, self._director, self._direction, rigidity
         )
         energy = density * self._dx(1)
-        return energy, energy
+        return energy, ufl.derivative(energy, self._state, test)
 
     def _dx(self, degree: int) -> Any:
         metadata = {"quadrature_degree": degree}
@@ -185,14 +185,13 @@ class ShellModel:
             height, c["free_edge_load"], c["free_edge_width"], c["free_edge_clearance"]
         )
         energy += support * ds
-        functional = energy
+        test, trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
+        residual = ufl.derivative(energy, self._state, test)
         if p.bending:
             rigidity = c["young_modulus"] * c["thickness"] ** 3 / 12
-            bending, work = self._bending(rigidity)
-            functional = energy + work
+            bending, force = self._bending(rigidity, test)
+            residual += force
             energy = energy + bending if bending is not None else energy
-        test, trial = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
-        residual = ufl.derivative(functional, self._state, test)
         virtual, _ = self._split(test)
         residual -= ufl.dot(pressure_force_density(gradient, c["pressure"]), virtual) * pressure_dx
         work = pressure_work_density(position, start, c["pressure"]) * pressure_dx

@@ -96,10 +96,13 @@ class Problem:
         tangent = ufl.as_vector([-normal[1], normal[0]])
         return self._assembled(moment * ufl.dot(rotation, tangent) * ds)
 
-    def surface_load(self, force: Any) -> Floats:
-        """(size,) nodal forces of a dead load per reference area, a UFL vector (3) [kPa]."""
+    def surface_load(self, force: Any, degree: int | None = None) -> Floats:
+        """(size,) nodal forces of a dead load per reference area, a UFL vector (3) [kPa];
+        ``degree`` of the quadrature, UFL's estimate if None."""
         virtual, _ = self.model._split(ufl.TestFunction(self.model.space))
-        return self._assembled(ufl.dot(force, virtual) * ufl.dx(domain=self.model.domain))
+        metadata = {} if degree is None else {"quadrature_degree": degree}
+        dx = ufl.Measure("dx", domain=self.model.domain, metadata=metadata)
+        return self._assembled(ufl.dot(force, virtual) * dx)
 
     def _assembled(self, form: Any) -> Floats:
         vector = fem_petsc.assemble_vector(compat.compile_form(form)).array_r
