@@ -285,4 +285,4 @@ def draw(axes: Any) -> None:
         axes.plot(*fold.shape[marks].T, "o", ms=3, color=line.get_color(), label=f"{degrees:.0f}°")
     axes.set(xlabel="x [mm]", ylabel="height [mm]", aspect="equal")
     axes.set_title("Clamped at an angle, pulled to the right")
-    axes.legend(title="clamped at", fontsize="small")
+    axes.legend(fontsize="small", ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.35))

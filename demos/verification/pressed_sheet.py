@@ -46,7 +46,7 @@ __all__ = ["Sheet", "draw", "membrane", "rod", "rows", "sampled_shifts", "shape_
 Floats = NDArray[np.float64]
 
 YOUNG, THICKNESS, PRESSURE = 1e6, 0.1, 8.0
-#: the same for the order of Newton's iteration
+#: E [kPa] and H [mm] of the softer sheet that shows the order of Newton's iteration
 SOFT = (1e4, 0.5)
 RADIUS, ROLLER, FREE_RADIUS, WIDTH = 12.0, 4.0, 6.0, 0.5
 #: angle at which the membrane leaves the wall, and half the sheet's length
@@ -302,7 +302,9 @@ def draw(axes: Any) -> None:
     nodes = sheet.shape[np.argsort(sheet.s)[::4]].T
     for side in (-1, 1):
         axes.plot(side * x, z, color="C0", lw=1, label="rod" if side > 0 else None)
-        axes.plot(side * nodes[0], nodes[1], "o", color="C1", ms=3, label=None)
+        axes.plot(
+            side * nodes[0], nodes[1], "o", color="C1", ms=3, label="nodes" if side > 0 else None
+        )
     axes.plot([-ROLLER, ROLLER], [z[-1]] * 2, "k^", ms=6, label="rollers")
     axes.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
     axes.set_title("A sheet pressed into a cylinder")
