@@ -83,7 +83,7 @@ class Wall(Table):
         None, description="distance over which d_0 grows from the suture [mm]; default 5 H"
     )
     growth: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
-        4.0, description="factor by which eta_1 is raised until the cusp is inside"
+        10.0, description="factor at most by which eta_1 is raised until the cusp is inside"
     )
     maximum_stiffness: Positive = Field(1e6, description="eta_1 is not raised beyond [kPa]")
 
@@ -107,7 +107,11 @@ class Solver(Table):
     tolerance: Positive = Field(
         1e-8, description="final residual relative to the pressure load P x area"
     )
-    path_tolerance: Positive = Field(1e-4, description="the same for the equilibria on the way")
+    path_tolerance: Positive = Field(
+        1e-2,
+        description="the same for the equilibria on the way; 1e-4 leads to the same end in twice"
+        " the iterations",
+    )
     boundary_steps: Annotated[int, Field(ge=1)] = Field(
         20, description="nominal steps of the sutured edge from template to suture line"
     )

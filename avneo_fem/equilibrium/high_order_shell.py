@@ -21,6 +21,7 @@ from avneo_fem.mechanics.hybrid_bending import (
     moment_on_edges,
     symmetric,
 )
+from avneo_fem.mechanics.projected_strain import projected_right_cauchy_green
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 
 __all__ = ["HighOrderShell", "shell_model"]
@@ -100,6 +101,15 @@ class HighOrderShell(ShellModel):
         weights = np.repeat(compat.cell_areas(self.domain) / count, count)
         shares = np.bincount(self.cell_nodes.ravel(), weights, minlength=len(self.node_points))
         return np.asarray(shares, float)
+
+    def _projected_strain(self, position: Any) -> Any:
+        if self.parameters.degree != 2 or not self.parameters.membrane_projection:
+            return None
+        element = compat.vector_element(self.domain, "DG", 3, 1)
+        barycentric = fem.Function(compat.function_space(self.domain, element))
+        rows = compat.cell_dofs(barycentric.function_space)
+        barycentric.x.array.reshape(-1, 3)[rows] = np.eye(3)
+        return projected_right_cauchy_green(self.domain, position, barycentric)
 
     # -- bending ---------------------------------------------------------------------------
     def _around_cells(self, integrand: Callable[[Any], Any]) -> Any:

@@ -56,8 +56,9 @@ class ShellParameters:
     degree : int
         Polynomial degree k of the positions; above 1 ``equilibrium.high_order_shell`` takes over.
     membrane_quadrature : int or None
-        Quadrature degree of the membrane energy; None: 2k - 2, but 1 for k = 1. For k = 2 these
-        three points keep thin shells from locking in their membrane part.
+        Quadrature degree of the membrane energy; None: 2k - 2, but 1 for k = 1.
+    membrane_projection : bool
+        Degree 2 only: keep thin curved shells from locking (``mechanics.projected_strain``).
     young_modulus, thickness, pressure : float
         E [kPa], H [mm], P [kPa].
     free_edge_stiffness, free_edge_width, free_edge_clearance : float
@@ -72,6 +73,7 @@ class ShellParameters:
     bending: bool = True
     degree: int = 1
     membrane_quadrature: int | None = None
+    membrane_projection: bool = True
     young_modulus: float = 1000.0
     thickness: float = 0.5
     pressure: float = 8.0
@@ -157,6 +159,10 @@ class ShellModel:
         energy = density * self._dx(1)
         return energy, ufl.derivative(energy, self._state, test)
 
+    def _projected_strain(self, position: Any) -> Any:
+        """What stands for C in the membrane energy; None: F^T F itself."""
+        return None
+
     def _dx(self, degree: int) -> Any:
         metadata = {"quadrature_degree": degree}
         return ufl.Measure("dx", domain=self.domain, metadata=metadata)
@@ -177,7 +183,9 @@ class ShellModel:
             metadata={"quadrature_degree": 2 * p.degree},
         )(_FREE_EDGE)
         material = material_named(p.material, c["young_modulus"])
-        energy = membrane_energy_density(gradient, material, c["thickness"]) * membrane_dx
+        projected = self._projected_strain(position)
+        density = membrane_energy_density(gradient, material, c["thickness"], projected)
+        energy = density * membrane_dx
         height = ufl.dot(position - c["plane_point"], c["plane_normal"]) - (
             ufl.SpatialCoordinate(self.domain)[1] - c["template_level"]
         )

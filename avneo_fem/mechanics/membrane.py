@@ -11,8 +11,15 @@ from avneo_fem.mechanics.materials import Material
 __all__ = ["membrane_energy_density"]
 
 
-def membrane_energy_density(gradient: Any, material: Material, thickness: Any) -> Any:
-    """H psi(C) [mN/mm]: energy per reference area whose variation is delta U_m of (1.2)."""
+def membrane_energy_density(
+    gradient: Any, material: Material, thickness: Any, projected: Any = None
+) -> Any:
+    """H psi(C) [mN/mm]: energy per reference area whose variation is delta U_m of (1.2).
+
+    ``projected`` is what to take for C instead of F^T F (``mechanics.projected_strain``).
+    """
+    if projected is not None:
+        return thickness * material.strain_energy(projected)
     vector = area_vector(gradient)
     square = ufl.dot(vector, vector)
     return thickness * material.strain_energy(right_cauchy_green(gradient), square)

@@ -6,22 +6,28 @@ of length L = 1 mm, rigidity EI = 1 per width (E = 12/H^3 kPa, so EA/EI = 12/H^2
 at x = 0, are made ten and a hundred times thinner, L/H = 20, 200, 2000; loads are relative to
 EI, so in the limit the answer does not depend on H.
 
-- *linear*: a small dead end force P L^2/EI = 0.01, deflection PL^3/3EI;
+- *linear*: a small dead end force P L^2/EI = 0.1, deflection about PL^3/3EI;
 - *large*: the force P L^2/EI = 4 of the cantilever of problem 3.1;
 - *curved*: the strip is first rolled to half a circle by an end moment, then a radial force
   P L^2/EI = 1 at its tip opens it. The test proper: a curved sheet under bending.
 
 Value: deflection of the loaded end along the force over the exact one, 1 when nothing locks;
-exact is the stretchable line (``cantilever.stretchable_tip``). Meshes are structured, or
-unstructured with four rows (at random, so no row of edges lies along the axis of bending), or
-stretched 20:1 either way. The figure to reach: 1 % for each thickness.
+exact is the stretchable line (``cantilever.stretchable_tip``). The figure to reach: 1 %.
 
-What is found. Degree 1 (one membrane strain a triangle) and degree 3 (full quadrature, 4) hold it
-on ordinary meshes. **Degree 2 locks**, most where the sheet is curved, with its three-point
-quadrature (2) as with the full one (4): on 128 triangles the large deflection comes to 0.98 of
-the exact one with three points, and 0.95 with full quadrature, at L/H = 2000, and the curved strip
-does not even keep its half circle. Three points defer the locking, they do not cure it. So the
-rows are those of degrees 1 and 3; ``rows(full, degrees=(2,))`` gives those of degree 2.
+Reached (``rows``): degree 1, whose membrane strain is one constant a triangle, and degree 3 with
+quadrature 4, on structured meshes and on unstructured ones with several rows, where no line of
+edges runs along the axis of bending; both also on some meshes stretched 20:1.
+
+Not reached (``missed``), ratios at L/H = 20, 200, 2000 or as said:
+
+- **degree 2 locks**, most where the sheet is curved. Curved strip, 128 triangles, unstructured:
+  1.000, 0.986, 0.602 with its three-point quadrature (2) and 1.000, 0.924, 0.198 with the full
+  one (4); large: 1.000, 1.000, 0.986 against 1.000, 0.998, 0.952. Three points defer the locking,
+  they do not cure it; structured meshes are no better.
+- degree 1 locks mildly, curved, when a wide unstructured mesh is coarse (32 x 16 on a width of
+  0.5, where a triangle turns by 0.1 rad): see ``missed``; twice as fine, 0.99.
+- degree 1, unstructured and stretched 20:1 along the strip: curved 0.892 at L/H = 200. Stretched
+  20:1 across it: too soft by 2 to 10 %, for every thickness, so that is no locking.
 """
 
 from __future__ import annotations
@@ -38,12 +44,15 @@ from record import Row
 from roll_up import plain_newton
 from solving import Problem, start
 
-__all__ = ["CASES", "MESHES", "Case", "deflection_ratio", "draw", "rows"]
+__all__ = ["CASES", "Case", "Grid", "deflection_ratio", "draw", "missed", "rows"]
 
 Floats = NDArray[np.float64]
 
+SOURCE = "stretchable line"
 SLENDER = (20, 200, 2000)  # L/H
 ALLOWED = 1e-2
+#: relative to EI/L^2; below it the residual drowns in rounding at L/H = 2000, where EA = 5e7 EI
+TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -74,28 +83,49 @@ class Grid:
 
 
 CASES = (
-    Case("linear", 0.01, steps=1),
+    Case("linear", 0.1, steps=1),
     Case("large", 4.0),
     Case("curved", -1.0, moment=np.pi, steps=5),
 )
-#: per degree: structured, unstructured, stretched across the strip, stretched along it
-MESHES: dict[int, tuple[Grid, ...]] = {
-    1: (Grid(64, 4, 0.1, True), Grid(64, 4, 0.1), Grid(64, 4, 1.25, True), Grid(16, 4, 0.0125)),
-    2: (Grid(32, 2, 0.1, True), Grid(32, 4, 0.1), Grid(32, 2, 1.25, True), Grid(16, 4, 0.0125)),
-    3: (Grid(16, 2, 0.1, True), Grid(16, 4, 0.1), Grid(16, 2, 2.5, True), Grid(16, 4, 0.0125)),
-}
+DRAWN = {1: Grid(64, 4, 0.1), 2: Grid(32, 2, 0.1), 3: Grid(16, 2, 0.1)}
+Claim = tuple[int, Grid, tuple[int, ...]]  # degree, mesh, slenderness L/H
+
+QUICK: tuple[Claim, ...] = ((1, Grid(64, 4, 0.1), (2000,)), (3, Grid(16, 2, 0.1), (2000,)))
+FULL: tuple[Claim, ...] = (
+    (1, Grid(64, 4, 0.1, True), SLENDER),
+    (1, Grid(64, 4, 0.1), SLENDER),
+    (1, Grid(64, 4, 0.0125 / 4, True), (200,)),
+    (3, Grid(16, 2, 0.1, True), SLENDER),
+    (3, Grid(16, 4, 0.1), SLENDER),
+    (3, Grid(16, 2, 2.5, True), (200, 2000)),
+    (3, Grid(16, 4, 0.0125), (200,)),
+)
+#: where 1 % is not reached, and why
+MISSED_QUICK: tuple[Claim, ...] = ((2, Grid(32, 2, 0.1), (2000,)),)
+MISSED: tuple[Claim, ...] = (
+    (2, Grid(32, 2, 0.1, True), (200, 2000)),  # locks
+    (2, Grid(32, 2, 0.1), (200, 2000)),  # locks
+    (1, Grid(32, 16, 0.5), SLENDER),  # locks, but only where curved
+    (1, Grid(64, 4, 0.0125 / 4), (200,)),  # locks, but only where curved
+    (1, Grid(64, 4, 1.25, True), (200, 2000)),  # too soft, the same for every thickness
+)
 
 
-def _settle(problem: Problem) -> None:
-    """Plain Newton; where it fails, the line search from the same state."""
+def _load(problem: Problem, target: Floats, halvings: int = 6) -> None:
+    """Raise the dead load to ``target`` by plain Newton, in halves where it fails."""
     state, directors = problem.state.copy(), problem.model.directors.copy()
+    before = problem.system.dead_load
+    before = np.zeros_like(target) if before is None else before
+    problem.system.dead_load = target
     try:
-        # below 1e-5 of the load E A drowns it in rounding at L/H = 2000
-        plain_newton(problem, 1e-5, 30)
+        plain_newton(problem, TOLERANCE, 30)
     except RuntimeError:
-        problem.state = state
+        if halvings == 0:
+            raise
+        problem.state, problem.system.dead_load = state, before
         problem.model.set_directors(directors)
-        problem.solve(1e-5, maximum_iterations=500)
+        _load(problem, (before + target) / 2, halvings - 1)
+        _load(problem, target, halvings - 1)
 
 
 def exact_deflection(case: Case, slender: float, faceted: bool) -> float:
@@ -119,7 +149,7 @@ def deflection_ratio(
     problem = start(
         strip(grid.columns, grid.rows, 1.0, grid.width, grid.structured),
         degree,
-        force_scale=abs(case.force) * grid.width,
+        force_scale=grid.width,
         young_modulus=12 / thickness**3,
         thickness=thickness,
         membrane_quadrature=quadrature,
@@ -132,38 +162,44 @@ def deflection_ratio(
     if case.moment:
         bent = -problem.edge_moment(lambda x: x[:, 0] > 1 - 1e-9, 1.0) * case.moment
         for step in range(1, case.steps + 1):
-            problem.system.dead_load = bent * step / case.steps
-            _settle(problem)
+            _load(problem, bent * step / case.steps)
     before = tip(problem, unit)[2]
     for step in range(1, case.steps + 1):
-        problem.system.dead_load = bent + unit * case.force * step / case.steps
-        _settle(problem)
+        _load(problem, bent + unit * case.force * step / case.steps)
     move = float(tip(problem, unit)[2] - before)
     return move / exact_deflection(case, slender, degree == 1)
 
 
-def rows(full: bool, degrees: tuple[int, ...] = (1, 3)) -> list[Row]:
-    """Deflection ratios; quick: the large and curved strip, unstructured, at L/H = 2000."""
+def _compare(claims: tuple[Claim, ...], cases: tuple[Case, ...]) -> list[Row]:
     answer = []
-    for degree in degrees:
-        for grid in MESHES[degree] if full else MESHES[degree][1:2]:
-            for case in CASES if full else CASES[1:]:
-                for slender in SLENDER if full else SLENDER[-1:]:
-                    try:
-                        ratio = deflection_ratio(degree, grid, case, slender)
-                    except RuntimeError:
-                        ratio = float("nan")
-                    name = f"{case.name}, degree {degree}, {grid}"
-                    what = f"deflection / exact at L/H = {slender}"
-                    answer.append(Row("locking", name, what, ratio, 1.0, ALLOWED, "elastica"))
+    for degree, grid, slender in claims:
+        for case in cases:
+            for ratio in slender:
+                try:
+                    value = deflection_ratio(degree, grid, case, ratio)
+                except RuntimeError:
+                    value = float("nan")
+                name = f"{case.name}, degree {degree}, {grid}"
+                what = f"deflection / exact at L/H = {ratio}"
+                answer.append(Row("locking", name, what, value, 1.0, ALLOWED, SOURCE))
     return answer
+
+
+def rows(full: bool) -> list[Row]:
+    """Deflection ratios; quick: the large and curved strip, unstructured, at L/H = 2000."""
+    return _compare(FULL, CASES) if full else _compare(QUICK, CASES[1:])
+
+
+def missed(full: bool) -> list[Row]:
+    """The same on meshes and degrees that are known not to reach the figure, see above."""
+    return _compare(MISSED, CASES) if full else _compare(MISSED_QUICK, CASES[2:])
 
 
 def draw(axes: Any) -> None:
     """Large deflection over thickness, unstructured: degrees 1 to 3, and 2 fully integrated."""
     axes.axhline(1.0, color="k", linewidth=0.8, label="exact")
     for degree, quadrature, mark in ((1, None, "o"), (2, None, "s"), (2, 4, "v"), (3, None, "^")):
-        grid = MESHES[degree][1]
+        grid = DRAWN[degree]
         found = [deflection_ratio(degree, grid, CASES[1], s, quadrature) for s in SLENDER]
         kind = "" if quadrature is None else ", full quadrature"
         label = f"degree {degree}{kind}, {2 * grid.columns * grid.rows} triangles"

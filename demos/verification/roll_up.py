@@ -74,6 +74,7 @@ def exact_tip(share: float) -> tuple[float, float]:
 def plain_newton(problem: Problem, tolerance: float = 1e-8, largest: int = 50) -> int:
     """Full Newton steps and nothing else; their number. Raises RuntimeError when it fails."""
     system, free = problem.system, problem.system.free
+    directors = problem.model.directors.copy()
     state = renew_directors(problem.model, problem.state)
     for iteration in range(largest + 1):
         force = system.residual(state)[free]
@@ -84,6 +85,7 @@ def plain_newton(problem: Problem, tolerance: float = 1e-8, largest: int = 50) -
         if not size < 1e12:
             break
         state[free] -= spsolve(system.tangent(state)[free][:, free].tocsc(), force)
+    problem.model.set_directors(directors)  # those that problem.state is measured from
     raise RuntimeError(f"plain Newton did not converge: residual {size:.1e}")
 
 
