@@ -147,6 +147,20 @@ def _checked(mesh: ipctk.CollisionMesh, before: Floats, mass: Floats, held: Bool
         raise ValueError("before: crosses itself; only a step from a state without is resolved")
 
 
+def _still_colliding(
+    mesh: ipctk.CollisionMesh,
+    before: Floats,
+    last: Floats,
+    points: Floats,
+    contacts: Contacts,
+    thickness: float,
+) -> Contacts:
+    """Collisions after ``last`` with its ``contacts`` became ``points``: the rest is as it was."""
+    changed = (last != points).any(axis=1)
+    changed[contacts.nodes] = True
+    return colliding_pairs(mesh, before, points, thickness, changed)
+
+
 def resolve(
     triangles: Ints,
     before: Floats,
@@ -204,23 +218,26 @@ def resolve(
 
     known = nearby_pairs(mesh, before, thickness, REPULSION, rest)
     points, impulses = apply_impulses(after, known, inverse_mass)
-    used = 0
-    while True:
-        contacts = colliding_pairs(mesh, before, points, thickness)
-        if not len(contacts) or used == rounds:
-            break
+    contacts, used = colliding_pairs(mesh, before, points, thickness), 0
+    while len(contacts) and used < rounds:
         used += 1
         known = known.replaced_by(contacts)  # or one repair would undo another, in turns
+        last = points
         points, given = apply_impulses(points, known, inverse_mass, _SWEEPS)
         impulses += given
+        contacts = _still_colliding(mesh, before, last, points, contacts, thickness)
 
     impulsive, merging = points, ImpactZones(before, mass, held)
     while len(contacts):
         if not merging.merge(contacts.nodes):
             raise CrossingsRemain(len(contacts))
-        points = merging.moved(impulsive)
-        contacts = colliding_pairs(mesh, before, points, thickness)
-    if ipctk.has_intersections(mesh, np.asfortranarray(points)):
-        raise CrossingsRemain(1)
+        last, points = points, merging.moved(impulsive)
+        contacts = _still_colliding(mesh, before, last, points, contacts, thickness)
+
+    if used or merging.size()[0]:
+        remaining = len(colliding_pairs(mesh, before, points, thickness))
+        crossing = ipctk.has_intersections(mesh, np.asfortranarray(points))
+        if remaining or crossing:
+            raise CrossingsRemain(max(remaining, 1))
     correction = np.linalg.norm(points - after, axis=1).max(initial=0.0)
     return Resolution(points, used, impulses, *merging.size(), float(correction))

@@ -25,6 +25,7 @@ FLOOR = 0.1
 #: least gap asked of a colliding pair, in the same measure: above FLOOR, or it would come back
 LEAST = 0.25
 _ROWS = 100_000  # pairs at a time: bounds the memory
+_STEPS = 100_000  # of one detection; what is not decided by then counts as a collision
 _TIE = 1e-9  # nearest points this close to equally near: the first is taken, whatever the rounding
 _EDGE_PAIR, _POINT_PAIR = ipctk.EdgeEdgeCandidate(0, 0), ipctk.FaceVertexCandidate(0, 0)
 
@@ -232,7 +233,7 @@ def _passing(start: Floats, end: Floats, thickness: float, is_edges: bool) -> tu
             times[k] = 0.0
             continue
         # ipctk stops at (1 - rescaling) of the first gap
-        detection = ipctk.AdditiveCCD(100_000, 1.0 - floor[k] / distance[k])
+        detection = ipctk.AdditiveCCD(_STEPS, 1.0 - floor[k] / distance[k])
         meets, time = kind.ccd(start[row].ravel(), end[row].ravel(), narrow_phase_ccd=detection)
         times[k] = time if meets else np.nan
     meeting = ~np.isnan(times)
@@ -240,15 +241,29 @@ def _passing(start: Floats, end: Floats, thickness: float, is_edges: bool) -> tu
 
 
 def colliding_pairs(
-    mesh: ipctk.CollisionMesh, before: Floats, after: Floats, thickness: float
+    mesh: ipctk.CollisionMesh,
+    before: Floats,
+    after: Floats,
+    thickness: float,
+    changed: Bools | None = None,
 ) -> Contacts:
     """Pairs that meet while all nodes move straight from ``before`` to ``after`` (n, 3) [mm].
 
     They are to end as far apart, along the normal at first touch, as they began, but no farther
-    than ``thickness`` [mm]. Where the two already touch the normal is zero.
+    than ``thickness`` [mm]. Where the two already touch the normal is zero. Only pairs with a
+    node that is ``changed`` (n,) are looked at; all, if not given.
     """
+    own = np.arange(1, len(before) + 1)
+    # patches do not collide with themselves: all unchanged nodes are one
+    patches = own if changed is None else np.where(changed, own, 0)
+    mesh.can_collide = ipctk.make_vertex_patches_filter(patches.astype(np.int32))
+    start, end = np.asfortranarray(before), np.asfortranarray(after)
     found = ipctk.Candidates()
-    found.build(mesh, np.asfortranarray(before), np.asfortranarray(after))
+    found.build(mesh, start, end)
+    # at once for all: stricter than FLOOR, so if this lets the whole step pass there is nothing
+    whole = ipctk.AdditiveCCD(_STEPS, 1.0 - FLOOR)
+    if found.compute_collision_free_stepsize(mesh, start, end, narrow_phase_ccd=whole) == 1.0:
+        return _joined([])
     parts = []
     for nodes, is_edges in _candidates(mesh, found):
         start, end = before[nodes], after[nodes]

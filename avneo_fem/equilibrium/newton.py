@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,7 +75,7 @@ class NewtonSolver:
         self.symmetric = Factorization(symmetric=True)
         self.general = Factorization(symmetric=False)
         self.iterations = 0
-        self._shift = 0.0
+        self._shift, self._convex = 0.0, False
 
     # -- pieces SNES calls ---------------------------------------------------------------------
     def _full(self, reduced: Any) -> Floats:
@@ -122,6 +123,14 @@ class NewtonSolver:
         """Newton direction of a model made convex by the smallest shift of a geometric series."""
         settings = self.settings
         shift = self._shift
+        close = bool(np.linalg.norm(force) < settings.exact_below * self._scale)
+        if close and self._convex:
+            # the iteration before was convex, and steps are small now: its inertia will do
+            with suppress(FactorizationError):
+                direction = self._unsymmetric(force)
+                if np.isfinite(direction).all() and direction @ force > 0:
+                    return direction
+        self._convex = False
         while True:
             matrix = self._tangent if shift == 0.0 else self._tangent + sp.diags(shift * self._mass)
             try:
@@ -130,9 +139,9 @@ class NewtonSolver:
                     self._shift = shift
                     direction = self.symmetric.solve(force)
                     # follower pressure at the free edge is not symmetric: near the end that counts
-                    if shift == 0.0 and np.linalg.norm(force) < settings.exact_below * self._scale:
-                        self.general.factorize(self._tangent)
-                        direction = self.general.solve(force)
+                    if shift == 0.0 and close:
+                        direction = self._unsymmetric(force)
+                        self._convex = True
                     if np.isfinite(direction).all() and direction @ force > 0:
                         return direction
             except FactorizationError:
@@ -141,12 +150,17 @@ class NewtonSolver:
             if shift > settings.largest_shift:
                 raise FactorizationError("no descent direction up to the largest shift")
 
+    def _unsymmetric(self, force: Floats) -> Floats:
+        self.general.factorize(self._tangent)
+        return self.general.solve(force)
+
     def _length(self, direction: Floats) -> float:
         step = np.zeros(self.system.model.size)
         step[self._free] = -direction
         moves = self.system.positions(step)
         longest = float(np.linalg.norm(moves, axis=1).max())
         share = min(1.0, self.settings.largest_move / max(longest, 1e-300))
+        self._convex = self._convex and share == 1.0
         contact = self.system.contact
         if contact is not None:
             clear = contact.step_fraction(self.system.positions(self._base), share * moves)
@@ -182,7 +196,7 @@ class NewtonSolver:
         mass = np.zeros(system.model.size)
         mass[system.model.position_dofs] = system.model.node_areas[:, None]
         self._mass = mass[self._free]
-        self._shift = 0.0
+        self._shift, self._convex = 0.0, False
         size = len(self._free)
         x = PETSc.Vec().createSeq(size)
         x.array[:] = state[self._free]
