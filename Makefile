@@ -12,10 +12,10 @@ PYTEST_ARGS ?=
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help setup demo test test-slow lint clean distclean
+.PHONY: help setup demo test test-slow verification lint clean distclean
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' Makefile
 
 setup: ## Debian packages and .venv, only what is missing
 	@bash .ci/setup.sh
@@ -28,6 +28,9 @@ test: setup ## the test suite (PYTEST_ARGS="-k scene" selects)
 
 test-slow: setup ## the tests that take longer than a few seconds each
 	$(PYTHON) -m pytest -m slow $(PYTEST_ARGS)
+
+verification: setup ## textbook benchmarks of the shells, table and plots in out/verification/
+	$(PYTHON) demos/verification
 
 lint: setup ## ruff check, ruff format --check, mypy
 	.venv/bin/ruff check .

@@ -30,11 +30,11 @@ def test_rows(quick: list[Row], case: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("degree", "columns", "least"), [(1, 32, (1.9, 1.9, 1.9)), (2, 12, (1.9, 3.0, 3.0))]
+    ("degree", "columns", "least"), [(1, 32, (1.9, 1.9, 1.9)), (2, 12, (1.8, 3.8, 3.8))]
 )
 def test_orders(degree: int, columns: int, least: tuple[float, ...]) -> None:
     """Truth: from h to h/2 the loop's surface angle, clamp moment and nodes converge with order 2
-    for degree 1, with at least 2, 3 and 3 for degree 2."""
+    for degree 1, with 2, 4 and 4 for degree 2, less 0.2 at most."""
     angles = np.radians([130.0, 170.0])
     first, second = (
         errors(Fold.of("loop", degree, n), angles)[:, :3].max(axis=0)

@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+ipctk.set_num_threads(1)
+
 #: two parts collide where they come within this share of their first gap (at most the thickness)
 FLOOR = 0.1
 #: least gap asked of a colliding pair, in the same measure: above FLOOR, or it would come back

@@ -140,8 +140,8 @@ class HighOrderShell(ShellModel):
         the barycentric coordinate lambda_e vanishes.
 
         The Legendre polynomial P_k(1 - 2 lambda_e) is 1 on e and 0 at the points of the others.
-        One rule for the three edges, and not three: FFCx 0.5.2 takes a shape function that is
-        constant on one edge for the same constant on the next.
+        One rule for the three edges, and not three: with three rules of one point each the energy
+        came out wrong (FFCx 0.5.2).
         """
         degree = self.parameters.degree
         element = compat.vector_element(self.domain, "DG", 2, degree)
@@ -177,7 +177,7 @@ class HighOrderShell(ShellModel):
         mass = ufl.inner(symmetric(moment_test), symmetric(moment_trial))
         force = self._moment_force(work, test)
         self._curvature_form = compat.compile_form(ufl.derivative(work, self._moment, moment_test))
-        # rows for the state: with the moments there, DOLFINx 0.5.2 turns the wrong edges' signs
+        # rows for the state: with rows for the moments DOLFINx 0.5.2 assembles wrong entries
         self._slope_form = compat.compile_form(ufl.derivative(force, self._moment, moment_trial))
         self._slope_matrix = fem_petsc.create_matrix(self._slope_form)
         self._moments = compat.cell_dofs(space)
