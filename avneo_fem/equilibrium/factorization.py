@@ -42,6 +42,10 @@ class Factorization:
             held.destroy()
         self._held = []
 
+    def __del__(self) -> None:
+        if not PETSc.Sys.isFinalized():
+            self._release()
+
     def _fresh(self, matrix: sp.csr_matrix) -> None:
         self._release()
         self._pattern = (matrix.indptr.copy(), matrix.indices.copy())

@@ -31,6 +31,10 @@ Fewer points defer the locking, they do not cure it; structured meshes are no be
 Not reached (``missed``), all degree 1: a wide and coarse unstructured mesh locks mildly (curved,
 L/H = 2000: 0.987); one stretched 20:1 along the strip locks (curved, L/H = 200: 0.892); one
 stretched 20:1 across it is too soft by 2 to 10 %, for every thickness, so that is no locking.
+
+Left out: stretched meshes at L/H = 20, where on wide strips (1.25 to 5 L, degrees 2 and 3) Newton
+found no equilibrium beyond some load however small its steps; and narrow ones at L/H = 2000,
+where the residual drowns in rounding above the tolerance asked here.
 """
 
 from __future__ import annotations
@@ -105,11 +109,11 @@ FULL: tuple[Claim, ...] = (
     (1, Grid(64, 4, 0.1), SLENDER),
     (1, Grid(64, 4, 0.0125 / 4, True), (200,)),
     (2, Grid(32, 2, 0.1, True), SLENDER),
-    (2, Grid(32, 4, 0.1), SLENDER),
+    (2, Grid(32, 3, 0.1), SLENDER),
     (2, Grid(32, 2, 1.25, True), (200, 2000)),
-    (2, Grid(32, 4, 0.00625), (200,)),
+    (2, Grid(16, 4, 0.0125), (200,)),
     (3, Grid(16, 2, 0.1, True), SLENDER),
-    (3, Grid(16, 4, 0.1), SLENDER),
+    (3, Grid(16, 3, 0.1), SLENDER),
     (3, Grid(16, 2, 2.5, True), (200, 2000)),
     (3, Grid(16, 4, 0.0125), (200,)),
 )

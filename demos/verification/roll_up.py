@@ -18,7 +18,7 @@ one long edge is held in its plane y = 0, as by a mirror, which changes nothing 
 
 Load steps (:func:`steps_needed`): plain Newton, full steps and nothing else, takes up to 0.2-0.3
 of the load at once from the flat strip, and the whole circle in four or five equal steps of some
-20 iterations. The line search on the energy gets as far in as many steps, but with three to six
+20 iterations. The line search on the energy gets as far in as many steps, but with four to six
 times the iterations: whatever stretches the strip on the way costs energy, so it shortens steps
 that plain Newton takes and repairs in the next.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avneo_fem import compat
-from avneo_fem.compat import fem_petsc, ufl
+from avneo_fem.compat import fem, fem_petsc, ufl
 from avneo_fem.equilibrium.cusp_system import CuspSystem
 from avneo_fem.equilibrium.directors import renew_directors, start_directors
 from avneo_fem.equilibrium.high_order_shell import shell_model
@@ -73,7 +73,8 @@ class Problem:
         tags = compat.edge_tags(domain, middle, 1)
         ds = ufl.Measure("ds", domain=domain, subdomain_data=tags)(1)
         virtual, _ = self.model._split(ufl.TestFunction(self.model.space))
-        return self._assembled(ufl.dot(ufl.as_vector([float(t) for t in traction]), virtual) * ds)
+        value = fem.Constant(domain, np.asarray(traction, dtype=float))
+        return self._assembled(ufl.dot(value, virtual) * ds)
 
     def edge_moment(self, where: Where, moment: float) -> Floats:
         """(size,) load of a ``moment`` per length [mN] about boundary edges at the places
@@ -94,7 +95,8 @@ class Problem:
         _, rotation = self.model._split(ufl.TestFunction(self.model.space))
         normal = ufl.FacetNormal(domain)
         tangent = ufl.as_vector([-normal[1], normal[0]])
-        return self._assembled(moment * ufl.dot(rotation, tangent) * ds)
+        value = fem.Constant(domain, np.float64(moment))
+        return self._assembled(value * ufl.dot(rotation, tangent) * ds)
 
     def surface_load(self, force: Any, degree: int | None = None) -> Floats:
         """(size,) nodal forces of a dead load per reference area, a UFL vector (3) [kPa];
