@@ -105,3 +105,14 @@ def test_badly_scaled_but_regular_is_not_refused() -> None:
     )
     right = a @ np.ones(40)
     np.testing.assert_allclose(solver.solve(right), np.ones(40), rtol=1e-6)
+
+
+def test_a_discarded_factorization_frees_its_factors() -> None:
+    """Truth: PETSc's objects do not wait for its own garbage collection, so that a sweep over
+    many solves does not grow."""
+    kept = Factorization(symmetric=True)
+    kept.factorize(sp.csr_matrix(np.diag([2.0, 3.0])))
+    solver = kept._solver
+    assert solver.handle != 0
+    del kept
+    assert solver.handle == 0

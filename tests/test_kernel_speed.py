@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from avneo_fem.equilibrium.high_order_shell import shell_model
 from avneo_fem.equilibrium.shell_model import ShellParameters
-from hand_derived import hand_derived_shell
 from kernel_speed import (
     BENDING_ALONE,
     FULL,
@@ -46,7 +46,7 @@ def test_by_hand_as_automatic(degree: int) -> None:
 @pytest.mark.parametrize("degree", [1, 2])
 def test_by_hand_is_the_derivative_of_the_energy(degree: int) -> None:
     """Truth: Taylor expansion of the energy; needs no automatic derivative to be right."""
-    model = hand_derived_shell(disc(2, 5.0), ShellParameters(degree=degree, **BENDING_ALONE))
+    model = shell_model(disc(2, 5.0), ShellParameters(degree=degree, **BENDING_ALONE))
     state, _ = bent_states(model)
     way = np.random.default_rng(4).uniform(-1, 1, model.size)
     slope, change = model.residual(state) @ way, model.tangent(state) @ way

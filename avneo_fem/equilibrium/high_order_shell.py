@@ -17,6 +17,8 @@ from avneo_fem.compat import fem, fem_petsc, ufl
 from avneo_fem.equilibrium.shell_model import ShellModel, ShellParameters
 from avneo_fem.mechanics.hybrid_bending import (
     angle_between,
+    moment_force_in_cells,
+    moment_force_on_edges,
     moment_on_cells,
     moment_on_edges,
     symmetric,
@@ -185,8 +187,16 @@ class HighOrderShell(ShellModel):
         return None, force
 
     def _moment_force(self, work: Any, test: Any) -> Any:
-        """Variation of the work of the moments with the state."""
-        return ufl.derivative(work, self._state, test)
+        """Variation of the work of the moments with the state, derived by hand."""
+        position, _ = self._split(self._state)
+        virtual, moment = self._split(test), ufl.as_vector(ufl.split(self._moment))
+        force = self._around_cells(
+            lambda normal: moment_force_on_edges(position, virtual, self._director, moment, normal)
+        )
+        degree = self.parameters.degree
+        if degree > 1:
+            force += moment_force_in_cells(position, virtual[0], moment) * self._dx(2 * degree - 1)
+        return force
 
     def _invert_mass(self, form: Any) -> None:
         """Inverse blocks of the mass matrix of the moments cell by cell, and roots R^T R = it."""

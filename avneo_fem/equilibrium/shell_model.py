@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from avneo_fem import compat
 from avneo_fem.compat import fem, fem_petsc, ufl
-from avneo_fem.mechanics.bending import bending_energy_density
+from avneo_fem.mechanics.bending import bending_energy_density, bending_force_density
 from avneo_fem.mechanics.loads import (
     free_edge_energy_density,
     pressure_force_density,
@@ -156,8 +156,15 @@ class ShellModel:
         density = bending_energy_density(
             self.domain, position, angle, self._director, self._direction, rigidity
         )
-        energy = density * self._dx(1)
-        return energy, ufl.derivative(energy, self._state, test)
+        force = bending_force_density(
+            self.domain,
+            (position, angle),
+            self._split(test),
+            self._director,
+            self._direction,
+            rigidity,
+        )
+        return density * self._dx(1), force * self._dx(1)
 
     def _projected_strain(self, position: Any) -> Any:
         """What stands for C in the membrane energy; None: F^T F itself."""

@@ -23,9 +23,10 @@ from __future__ import annotations
 from typing import Any
 
 from avneo_fem.compat import ufl
+from avneo_fem.mechanics.edge_turn import turn_variation
 from avneo_fem.mechanics.kinematics import unit_normal
 
-__all__ = ["bending_energy_density", "edge_rotations"]
+__all__ = ["bending_energy_density", "bending_force_density", "edge_rotations"]
 
 
 def _barycentric_gradients(domain: Any) -> list[Any]:
@@ -85,3 +86,32 @@ def bending_energy_density(
     for theta, length, outward in edge_rotations(domain, position, angle, director, direction):
         curvature = curvature + length * theta / area * ufl.outer(outward, outward)
     return rigidity / 2 * ufl.inner(curvature, curvature)
+
+
+def bending_force_density(
+    domain: Any,
+    state: tuple[Any, Any],
+    virtual: tuple[Any, Any],
+    director: Any,
+    direction: Any,
+    rigidity: Any,
+) -> Any:
+    """D kappa : delta kappa [mN/mm], variation of :func:`bending_energy_density`.
+
+    ``state`` and ``virtual`` are (position, angle) and their variations; one-point quadrature.
+    """
+    position, angle = state
+    area = ufl.CellVolume(domain)
+    gradient, change = ufl.grad(position), ufl.grad(virtual[0])
+    curvature, variation = ufl.zero(2, 2), ufl.zero(2, 2)
+    rotations = edge_rotations(domain, position, angle, director, direction)
+    sides = zip(_to_edge_midpoints(domain), rotations, strict=True)
+    for arm, (theta, length, outward) in sides:
+        tangent = ufl.as_vector([-outward[1], outward[0]])
+        sign = ufl.dot(tangent, direction + ufl.grad(direction) * arm)
+        turn = turn_variation(gradient, change, director + ufl.grad(director) * arm, outward)
+        turn += sign * (virtual[1] + ufl.dot(ufl.grad(virtual[1]), arm))
+        both = ufl.outer(outward, outward)
+        curvature = curvature + length * theta / area * both
+        variation = variation + length * turn / area * both
+    return rigidity * ufl.inner(curvature, variation)

@@ -23,9 +23,18 @@ from __future__ import annotations
 from typing import Any
 
 from avneo_fem.compat import ufl
-from avneo_fem.mechanics.kinematics import unit_normal
+from avneo_fem.mechanics.edge_turn import turn_variation
+from avneo_fem.mechanics.kinematics import area_vector, right_cauchy_green, unit_normal
 
-__all__ = ["angle_between", "director_angle", "moment_on_cells", "moment_on_edges", "symmetric"]
+__all__ = [
+    "angle_between",
+    "director_angle",
+    "moment_force_in_cells",
+    "moment_force_on_edges",
+    "moment_on_cells",
+    "moment_on_edges",
+    "symmetric",
+]
 
 
 def symmetric(components: Any) -> Any:
@@ -81,3 +90,35 @@ def moment_on_edges(position: Any, rotation: Any, director: Any, moment: Any, no
     """m_nunu theta of one triangle at its edge; ``normal`` is nu, all arguments on one side."""
     angle = director_angle(ufl.grad(position), rotation, director, normal)
     return ufl.dot(normal, symmetric(moment) * normal) * angle
+
+
+def moment_force_on_edges(
+    position: Any, virtual: tuple[Any, Any], director: Any, moment: Any, normal: Any
+) -> Any:
+    """m_nunu delta theta, variation of :func:`moment_on_edges`.
+
+    ``virtual`` holds the variations of position and rotation.
+    """
+    tangent = ufl.as_vector([-normal[1], normal[0]])
+    turn = turn_variation(ufl.grad(position), ufl.grad(virtual[0]), director, normal)
+    return ufl.dot(normal, symmetric(moment) * normal) * (ufl.dot(virtual[1], tangent) + turn)
+
+
+def moment_force_in_cells(position: Any, virtual: Any, moment: Any) -> Any:
+    """Variation of :func:`moment_on_cells`, with delta n = -F C^-1 G^T n:
+
+    -m : (grad grad delta phi . n + grad grad phi . delta n).
+    """
+    gradient, change = ufl.grad(position), ufl.grad(virtual)
+    square, area = right_cauchy_green(gradient), area_vector(gradient)
+    normal = area / ufl.sqrt(ufl.dot(area, area))
+    adjugate = ufl.as_matrix([[square[1, 1], -square[0, 1]], [-square[1, 0], square[0, 0]]])
+    steepness = adjugate * (gradient.T * _contracted(moment, position)) / ufl.dot(area, area)
+    return ufl.dot(normal, change * steepness) - ufl.dot(normal, _contracted(moment, virtual))
+
+
+def _contracted(moment: Any, field: Any) -> Any:
+    """m : grad grad of a vector field, (3,)."""
+    tensor, second = symmetric(moment), ufl.grad(ufl.grad(field))
+    places = [(i, j) for i in range(2) for j in range(2)]
+    return ufl.as_vector([sum(tensor[i, j] * second[k, i, j] for i, j in places) for k in range(3)])

@@ -4,8 +4,10 @@ The template of Experiment 1 (demos/experiment_1.toml) is meshed with edges of 1
 bent smoothly; shells of degree 1 and 2 (neo-Hookean, E = 1000 kPa, H = 0.5 mm) are assembled and
 factorised there, in one run, in these variants:
 
-- *automatic*: ``avneo_fem`` with the bending energy differentiated twice by UFL;
-- *by hand*: the same with the first variations of ``hand_derived``;
+- *automatic*: the same shells with the bending energy differentiated twice by UFL
+  (``automatic``);
+- *by hand*: the package itself, whose first variations are derived by hand
+  (``mechanics.edge_turn``);
 - *bare loop*: nothing but DOLFINx's assembly of the same or of the stock form into a PETSc
   matrix, and its LU factorisation by MUMPS;
 - *stock*: what one would write first, an energy and DOLFINx's own Newton solver: the linear
@@ -44,6 +46,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from automatic import automatic_shell
 from avneo_fem import compat
 from avneo_fem.compat import PETSc, fem, fem_petsc, ufl
 from avneo_fem.equilibrium.directors import start_directors
@@ -52,6 +55,7 @@ from avneo_fem.equilibrium.high_order_shell import HighOrderShell, shell_model
 from avneo_fem.equilibrium.newton import NewtonSettings, NewtonSolver
 from avneo_fem.equilibrium.shell_model import ShellModel, ShellParameters
 from avneo_fem.geometry.template import CuspTemplate
+from avneo_fem.mechanics.hybrid_bending import moment_force_on_edges
 from avneo_fem.mechanics.kinematics import unit_normal
 from avneo_fem.mechanics.loads import pressure_force_density
 from avneo_fem.mechanics.materials import NeoHookean
@@ -59,7 +63,6 @@ from avneo_fem.mechanics.membrane import membrane_energy_density
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.scene import Template
-from hand_derived import hand_derived_shell, moment_force_on_edges
 from solving import Problem, start
 
 __all__ = ["FULL", "Figure", "Level", "disagreement", "expected", "measure", "report"]
@@ -69,8 +72,8 @@ Floats = NDArray[np.float64]
 Task = Callable[[], Any] | tuple[Callable[[], Any], Callable[[], Any]]
 
 VARIANTS: dict[str, Callable[[CuspMesh, ShellParameters], ShellModel]] = {
-    "automatic": shell_model,
-    "by hand": hand_derived_shell,
+    "automatic": automatic_shell,
+    "by hand": shell_model,
 }
 STOCK = {1: "P1 membrane", 2: "P2 C0-IP"}
 SAME = 1e-10
@@ -192,7 +195,7 @@ def membrane_quadrature(mesh: CuspMesh, case: str, degree: int, repeats: int) ->
     rules, tasks, residuals = (1, 2) if degree == 1 else (2, 4, 6), [], []
     for quadrature in rules:
         chosen = ShellParameters(degree=degree, membrane_quadrature=quadrature)
-        model = hand_derived_shell(mesh, chosen)
+        model = shell_model(mesh, chosen)
         states = bent_states(model)
         residuals.append(model.residual(states[0]))
         tasks.append(_alternating(model.tangent, states))
@@ -468,7 +471,7 @@ def compiler_flags(mesh: CuspMesh, level: Level) -> Iterator[Figure]:
             chosen = {"cffi_extra_compile_args": flags.split()}
             with empty_cache(), mock.patch.dict(compat._JIT, chosen):
                 clock = _cpu_of_all()
-                models.append(hand_derived_shell(mesh, ShellParameters(degree=degree)))
+                models.append(shell_model(mesh, ShellParameters(degree=degree)))
                 seconds.append(_cpu_of_all() - clock)
         states = [bent_states(model) for model in models]
         for model, flags in zip(models, level.flags, strict=True):
