@@ -12,6 +12,7 @@ from scipy.spatial import Delaunay, cKDTree
 from avneo_fem.equilibrium.directors import start_directors
 from avneo_fem.equilibrium.shell_model import ShellModel, ShellParameters
 from avneo_fem.meshing.cusp_mesh import CuspMesh
+from meshes import disc as disc
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -56,21 +57,6 @@ def strip(columns: int, rows: int, length: float, width: float, jitter: float = 
     node = np.arange(len(points)).reshape(rows + 1, columns + 1)
     suture = np.r_[node[::-1, 0], node[0, 1:], node[1:, -1]]
     return triangulated(points, suture, node[-1])
-
-
-def disc(rings: int, radius: float = 1.0, jitter: float = 0.1) -> CuspMesh:
-    """Unstructured mesh of a disc about the origin; the upper half circle is the free edge."""
-    random = np.random.default_rng(rings)
-    points = [np.zeros((1, 2))]
-    for ring in range(1, rings + 1):
-        angle = np.pi + 2 * np.pi * np.arange(6 * ring) / (6 * ring)
-        points.append(radius * ring / rings * np.c_[np.cos(angle), np.sin(angle)])
-    cloud = np.vstack(points)
-    rim = len(cloud) - 6 * rings + np.arange(6 * rings)
-    inside = np.arange(len(cloud)) < rim[0]
-    cloud[inside] += jitter * radius / rings * random.uniform(-1, 1, (inside.sum(), 2))
-    half = 3 * rings
-    return triangulated(cloud, rim[: half + 1], np.r_[rim[0], rim[: half - 1 : -1]])
 
 
 def renumbered(mesh: CuspMesh, new_number: Ints) -> CuspMesh:
