@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
@@ -46,6 +46,7 @@ __all__ = [
     "MPI",
     "PETSC_ERROR",
     "PETSc",
+    "assembled_matrix",
     "cell_areas",
     "cell_corners",
     "cell_dofs",
@@ -139,6 +140,14 @@ def compile_form(form: Any) -> Any:
     """Compile a UFL form with this project's compiler flags (cached on disk by signature)."""
     with _compiling() as options:
         return _form(form, **options)
+
+
+def assembled_matrix(form: Any) -> csr_matrix:
+    """Matrix of a compiled bilinear form, assembled once."""
+    matrix = fem_petsc.assemble_matrix(form)
+    matrix.assemble()
+    rows, columns, values = matrix.getValuesCSR()
+    return csr_matrix((values, columns, rows), shape=matrix.size)
 
 
 def create_mesh(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> Any:
@@ -245,12 +254,7 @@ def vector_nodes(space: Any, degree: int) -> tuple[NDArray[np.int64], NDArray[np
     mass = compile_form(sum(ufl.inner(test, trial) for test, trial in parts) * dx)
     x, y = ufl.SpatialCoordinate(domain)
     right = compile_form(ufl.inner(ufl.as_vector([x, y, 0 * x]), ufl.TestFunctions(space)[0]) * dx)
-    matrix = fem_petsc.assemble_matrix(mass)
-    matrix.assemble()
-    rows, columns, values = matrix.getValuesCSR()
-    projected = splu(csc_matrix(csr_matrix((values, columns, rows)))).solve(
-        fem_petsc.assemble_vector(right).array_r
-    )
+    projected = splu(assembled_matrix(mass).tocsc()).solve(fem_petsc.assemble_vector(right).array_r)
     return triples, projected[triples[:, :2]]
 
 

@@ -200,10 +200,7 @@ class HighOrderShell(ShellModel):
 
     def _invert_mass(self, form: Any) -> None:
         """Inverse blocks of the mass matrix of the moments cell by cell, and roots R^T R = it."""
-        matrix = fem_petsc.assemble_matrix(form)
-        matrix.assemble()
-        rows, columns, values = matrix.getValuesCSR()
-        mass = sp.csr_matrix((values, columns, rows))
+        mass = compat.assembled_matrix(form)
         cells, count = self._moments.shape
         places = np.repeat(self._moments, count, 1).ravel(), np.tile(self._moments, count).ravel()
         blocks = np.linalg.inv(np.asarray(mass[places]).reshape(cells, count, count))
@@ -327,11 +324,8 @@ class HighOrderShell(ShellModel):
                 * along(test, normal)
             )
         )
-        matrix = fem_petsc.assemble_matrix(compat.compile_form(mass))
-        matrix.assemble()
-        rows, columns, values = matrix.getValuesCSR()
         dofs = self._trace_dofs.ravel()
-        full = sp.csr_matrix((values, columns, rows))
+        full = compat.assembled_matrix(compat.compile_form(mass))
         return splu(full[dofs][:, dofs].tocsc()), compat.compile_form(change)
 
     def start_directors(self, state: Floats) -> Floats:
