@@ -20,6 +20,10 @@ __all__ = ["ClampPenalty"]
 Floats = NDArray[np.float64]
 
 
+#: below this angle at renewal the apex's height over the half-plane stands for the angle [rad]
+_NEAR = np.radians(60.0)
+
+
 class ClampPenalty:
     """Energy k/2 sum_e l_e theta_e^2 over the suture edges, which do not move.
 
@@ -62,6 +66,7 @@ class ClampPenalty:
         self._inward = -across / np.linalg.norm(across, axis=1, keepdims=True)
         self._normal = np.cross(tangent, -self._inward)
         self.turned = np.zeros(len(apex))
+        self._near, self._scale = np.zeros(len(apex), dtype=bool), np.ones(len(apex))
 
     def _polar(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Angle, squared distance from the edge, and the arm across it: radial, turned by 90."""
@@ -83,28 +88,41 @@ class ClampPenalty:
         return float(np.sqrt(np.average(self.angles(points) ** 2, weights=self._line_lengths)))
 
     def renew(self, points: Floats) -> None:
-        """Count further rotations from the present angles."""
-        self.turned = self.angles(points)
+        """Count further rotations, and measure heights, from the present state."""
+        self.turned, square, _, _ = self._polar(points)
+        self._near = np.abs(self.turned) < _NEAR
+        self._scale = np.where(self._near, np.sqrt(square), 1.0)
+
+    def _height(self, points: Floats) -> Floats:
+        """(k,) height of the apex over the half-plane in units of its arm at renewal."""
+        arm = points[self.apex] - self._origin
+        return np.einsum("kd,kd->k", arm, self._normal) / self._scale
 
     def energy(self, points: Floats) -> float:
         """Energy [mN mm]."""
-        return float(self.stiffness / 2 * np.dot(self.lengths, self.angles(points) ** 2))
+        measure = np.where(self._near, self._height(points), self.angles(points))
+        return float(self.stiffness / 2 * np.dot(self.lengths, measure**2))
 
     def gradient(self, points: Floats) -> Floats:
         """(n, 3) [mN]."""
         angle, square, _, turning = self._polar(points)
+        slope = np.where(self._near[:, None], self._slope(), turning / square[:, None])
+        measure = np.where(self._near, self._height(points), angle)
         result = np.zeros((self.count, 3))
-        force = (self.stiffness * self.lengths * angle / square)[:, None] * turning
-        np.add.at(result, self.apex, force)
+        np.add.at(result, self.apex, (self.stiffness * self.lengths * measure)[:, None] * slope)
         return result
 
+    def _slope(self) -> Floats:
+        return self._normal / self._scale[:, None]
+
     def hessian(self, points: Floats) -> sp.spmatrix:
-        """(3n, 3n) [mN/mm]: k l (grad theta grad theta^T + theta grad grad theta)."""
+        """(3n, 3n) [mN/mm]."""
         angle, square, radial, turning = self._polar(points)
-        load = self.stiffness * self.lengths
+        slope = np.where(self._near[:, None], self._slope(), turning / square[:, None])
         mixed = radial[:, :, None] * turning[:, None, :]
         bend = -(mixed + mixed.transpose(0, 2, 1)) / (square**2)[:, None, None]
-        blocks = turning[:, :, None] * turning[:, None, :] / (square**2)[:, None, None]
+        bend[self._near] = 0.0
+        blocks = slope[:, :, None] * slope[:, None, :] + angle[:, None, None] * bend
         total = np.zeros((self.count, 3, 3))
-        np.add.at(total, self.apex, load[:, None, None] * (blocks + angle[:, None, None] * bend))
+        np.add.at(total, self.apex, (self.stiffness * self.lengths)[:, None, None] * blocks)
         return block_diagonal(total)

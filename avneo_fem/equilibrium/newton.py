@@ -27,6 +27,9 @@ __all__ = ["NewtonSettings", "NewtonSolver", "Verdict"]
 
 Floats = NDArray[np.float64]
 
+#: times at most that a direction is corrected for penalties it switches on or off
+_FORESIGHT = 4
+
 _REASONS = {
     2: "converged: residual below tolerance",
     -5: "iteration limit reached",
@@ -74,8 +77,8 @@ class NewtonSolver:
         self.system, self.settings = system, settings
         self.symmetric = Factorization(symmetric=True)
         self.general = Factorization(symmetric=False)
-        self.iterations = 0
-        self._shift, self._convex = 0.0, False
+        self.iterations, self.hindered, self.looks = 0, 0, 0
+        self._shift, self._hold, self._convex = 0.0, 0, False
 
     # -- pieces SNES calls ---------------------------------------------------------------------
     def _full(self, reduced: Any) -> Floats:
@@ -100,6 +103,7 @@ class NewtonSolver:
         return change
 
     def _jacobian(self, _snes: Any, x: Any, _a: Any, _p: Any) -> None:
+        self._note_step(x.array_r - self._base[self._free])
         self._base = self._full(x)
         self._base_energy = self.system.energy(self._base, self._extra)
         self._energy_scale = max(abs(self._base_energy), 1.0)
@@ -143,12 +147,38 @@ class NewtonSolver:
                         direction = self._unsymmetric(force)
                         self._convex = True
                     if np.isfinite(direction).all() and direction @ force > 0:
-                        return direction
+                        return self._with_foresight(direction, force, matrix)
             except FactorizationError:
                 pass
+            self._hold = 2
             shift = max(4.0 * shift, settings.first_shift)
             if shift > settings.largest_shift:
                 raise FactorizationError("no descent direction up to the largest shift")
+
+    def _with_foresight(self, direction: Floats, force: Floats, matrix: Any) -> Floats:
+        """Direction that takes into account which penalties begin or cease to act on its way."""
+        last = None
+        for _ in range(_FORESIGHT):
+            step = np.zeros(self.system.model.size)
+            step[self._free] = -direction
+            found = self.system.foreseen(self._base, step)
+            if found is None:
+                return direction
+            switched, residual, tangent = found
+            if not switched.any() if last is None else np.array_equal(switched, last):
+                return direction
+            last = switched
+            self.looks += 1
+            with suppress(FactorizationError):
+                if self.symmetric.factorize(matrix + tangent[self._free][:, self._free]):
+                    return direction
+                better = self.symmetric.solve(force + residual[self._free])
+                if not np.isfinite(better).all() or better @ force <= 0:
+                    return direction
+                direction = better
+                continue
+            return direction
+        return direction
 
     def _unsymmetric(self, force: Floats) -> Floats:
         self.general.factorize(self._tangent)
@@ -166,12 +196,24 @@ class NewtonSolver:
             clear = contact.step_fraction(self.system.positions(self._base), share * moves)
             if clear < 1.0:
                 share *= self.settings.safety * clear
-        # a shortened step asks for more damping next time, a full one for less
+        self._asked, self._share = share * float(np.linalg.norm(direction)), share
+        return share
+
+    def _note_step(self, taken: Floats) -> None:
+        """Choose the next shift: more after a step that was cut short, less after a full one."""
+        if self._asked == 0.0:
+            return
+        share = self._share * float(np.linalg.norm(taken)) / self._asked
+        self.hindered += self._shift > 0.0 or share < 0.5
         first = self.settings.first_shift
-        self._shift = self._shift / 4 if share > 0.5 else max(2 * self._shift, 0.5 * first)
+        if share <= 0.5:
+            self._shift = max(2 * self._shift, 0.5 * first)
+        elif self._hold > 0:
+            self._hold -= 1  # a smaller one was refused not long ago
+        else:
+            self._shift /= 4
         if self._shift < 0.01 * first:
             self._shift = 0.0
-        return share
 
     # -- solve ---------------------------------------------------------------------------------
     def solve(
@@ -196,7 +238,7 @@ class NewtonSolver:
         mass = np.zeros(system.model.size)
         mass[system.model.position_dofs] = system.model.node_areas[:, None]
         self._mass = mass[self._free]
-        self._shift, self._convex = 0.0, False
+        self._convex, self.hindered, self._asked, self._base = False, 0, 0.0, self._start
         size = len(self._free)
         x = PETSc.Vec().createSeq(size)
         x.array[:] = state[self._free]

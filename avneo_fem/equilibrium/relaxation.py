@@ -114,6 +114,8 @@ class Relaxation:
             stalls = 0 if verdict.iterations or verdict.converged else stalls + 1
             if verdict.converged:
                 damping /= settings.decrease
+            elif verdict.iterations and 3 * self.newton.hindered < verdict.iterations:
+                damping /= settings.increase
             else:
                 damping = max(settings.increase * damping, 10 * settings.smallest)
             damping = min(damping, settings.largest)

@@ -14,7 +14,7 @@ __all__ = ["harmonic_extension"]
 Floats = NDArray[np.float64]
 
 
-def harmonic_extension(mesh: CuspMesh, values: Floats) -> Floats:
+def harmonic_extension(mesh: CuspMesh, held: NDArray[np.int64], values: Floats) -> Floats:
     """Discrete harmonic functions with given values at the suture line (design.md §3).
 
     The free edge is left to its natural condition.
@@ -22,13 +22,15 @@ def harmonic_extension(mesh: CuspMesh, values: Floats) -> Floats:
     Parameters
     ----------
     mesh : CuspMesh
+    held : (k,) array
+        Nodes where the values are given, among them the suture line.
     values : (k, d) array
-        What to extend, at ``mesh.suture_line``.
+        What to extend.
 
     Returns
     -------
     (n, d) array
-        At all nodes; exactly ``values`` at the suture line.
+        At all nodes; exactly ``values`` at ``held``.
     """
     corners = mesh.points[mesh.triangles]
     opposite = np.stack([corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3] for k in range(3)], 1)
@@ -37,7 +39,6 @@ def harmonic_extension(mesh: CuspMesh, values: Floats) -> Floats:
     columns = np.tile(mesh.triangles, (1, 3)).ravel()
     count = len(mesh.points)
     stiffness = sp.csr_matrix((local.ravel(), (rows, columns)), shape=(count, count))
-    held = mesh.suture_line
     inside = np.setdiff1d(np.arange(count), held)
     result = np.zeros((count, values.shape[1]))
     result[held] = values

@@ -19,6 +19,7 @@ from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
 from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.scene import Scene
+from avneo_fem.stages.blocked_edge import LaidRow, blocked_row
 from avneo_fem.stages.placement import place_template
 
 __all__ = ["CuspSetup", "clearances", "near_suture"]
@@ -107,6 +108,7 @@ class CuspSetup:
         self.conormal = self.cusp.sutured_conormal(middles)
         self.wall, self.wedge = self._penalties()
         self.clamp = self._clamp()
+        self.row = self._blocked_row()
         membrane = scene.material.young_modulus * self.cusp.thickness
         self.contact = self._self_contact(membrane)
         self.system = CuspSystem(self.model, self.contact)
@@ -173,6 +175,18 @@ class CuspSetup:
         sides = np.stack([self.target[:-1], self.target[1:]], axis=1)
         lengths = np.linalg.norm(mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]], axis=1)
         return ClampPenalty(len(mesh.points), apex, sides, self.conormal, lengths)
+
+    def _blocked_row(self) -> LaidRow:
+        return blocked_row(
+            self.mesh,
+            self.clamp.apex,
+            self.target,
+            self.conormal,
+            self.wedges.wedge(self.index, 1.0),
+            self.wedge.clearance,
+            0.4 * self.scene.inside_tolerance(self.cusp.thickness),
+            self.geometry.commissures.normal,
+        )
 
     def _self_contact(self, membrane: float) -> SelfContact:
         options = self.scene.solver

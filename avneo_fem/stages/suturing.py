@@ -104,8 +104,9 @@ class CuspSuturing:
     def _begin(self) -> tuple[Floats, int]:
         """First state, and no level behind it."""
         setup, model = self.setup, self.setup.model
-        away = setup.target - setup.start[setup.mesh.suture_line]
-        self._way = harmonic_extension(setup.mesh, away)
+        line = setup.mesh.suture_line
+        away = setup.target - setup.start[line]
+        self._way = harmonic_extension(setup.mesh, line, away)
         state = np.zeros(model.size)
         state[model.position_dofs] = setup.start
         return start_directors(model, state), 0
@@ -181,6 +182,7 @@ class CuspSuturing:
             setup.system.terms = [setup.wall]
         elif name == "clamped_edge":
             setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
+            setup.system.fix(setup.model.position_dofs[setup.row.nodes])
             setup.system.terms = [setup.wall, setup.clamp]
         elif name == "contact_wedge":
             clamp = [setup.clamp] if setup.scene.material.bending else []
@@ -317,11 +319,30 @@ class CuspSuturing:
         setup, model = self.setup, self.setup.model
         state = renew_directors(model, state)
         rest = clamp_rotation(model, state, setup.conormal)
-        trial = state.copy()
-        trial[model.angle_dofs[setup.mesh.suture_edges]] += (stop - start) / (1.0 - start) * rest
+        share = (stop - start) / (1.0 - start)
+        trial, reason = self._lay_row(state, share)
+        if trial is None:
+            return None, reason
+        trial[model.angle_dofs[setup.mesh.suture_edges]] += share * rest
         full, count = setup.scene.clamp.stiffness, self.options.clamp_steps
         setup.clamp.stiffness = full * 4.0 ** (count * (stop - 1.0))
         return self._settle(trial)
+
+    def _lay_row(self, state: Floats, share: float) -> Outcome:
+        """Move the nodes without room in their half-plane by a share of their way."""
+        setup, row, trial = self.setup, self.setup.row, state.copy()
+        points = setup.system.positions(state)
+        held = np.r_[setup.mesh.suture_line, row.nodes]
+        away = np.zeros((len(held), 3))
+        away[len(setup.mesh.suture_line) :] = (
+            row.on_the_way(points[row.nodes], share) - points[row.nodes]
+        )
+        move = harmonic_extension(setup.mesh, held, away)
+        clear = setup.contact.step_fraction(points, move)
+        if clear < 1.0:
+            return None, f"layers would collide after {clear:.2f} of the step"
+        trial[setup.model.position_dofs] += move
+        return trial, ""
 
     def _close_wedge(self, state: Floats, _start: float, stop: float) -> Outcome:
         self.setup.wedge.field = self.setup.wedges.wedge(self.setup.index, max(stop, 0.0))
@@ -340,6 +361,7 @@ class CuspSuturing:
         setup = self.setup
         free = np.ones(len(points), dtype=bool)
         free[setup.mesh.suture_line] = False
+        free[setup.row.nodes] = False
         distance = setup.wall.evaluate(points)[0]
         tapered = setup.wall.clearance < setup.wall.clearance.max()
         wall = np.where(tapered, -distance, setup.wall.clearance - distance)

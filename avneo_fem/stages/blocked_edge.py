@@ -1,0 +1,130 @@
+"""Sutured edges whose tangent half-plane leads straight into the neighbouring cusp.
+
+Next to a commissure the half-plane (3.1) points at the neighbour, whose own sutured edge lies one
+thickness away, so the cusp cannot follow it by more than the clearance that is left: next to
+nothing. A shell that is clamped there and must keep clear squeezes its first row of triangles to
+a thousandth of their area. That row carries no information but ruins the condition of every
+matrix; so it is laid down where it must end up, as part of the stitch. Its width is that of a
+triangle: under refinement it vanishes, and what is left is an edge that may turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avneo_fem.constraints.signed_distance_penalty import SignedDistance
+from avneo_fem.meshing.cusp_mesh import CuspMesh
+
+__all__ = ["LaidRow", "blocked_row"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: a row is laid down where less than this share of its height has room
+_ROOM = 0.5
+_SAMPLES = 40
+
+
+@dataclass(frozen=True)
+class LaidRow:
+    """Nodes of the first row that have no room in their half-plane, and where they belong.
+
+    Attributes
+    ----------
+    nodes : (j,) int array
+    foot : (j, 3) array
+        Points of the suture line next to which they are laid [mm].
+    tangent, inward, normal : (j, 3) arrays
+        Frame of the half-plane: along the suture line, into the half-plane, and across it.
+    reach : (j,) array
+        Distance from the suture line that the clearance allows [mm].
+    """
+
+    nodes: Ints
+    foot: Floats
+    tangent: Floats
+    inward: Floats
+    normal: Floats
+    reach: Floats
+
+    @property
+    def places(self) -> Floats:
+        """(j, 3) where the nodes belong [mm]."""
+        return self.foot + self.reach[:, None] * self.inward
+
+    def on_the_way(self, points: Floats, share: float) -> Floats:
+        """(j, 3) places of nodes at ``points`` (j, 3) after ``share`` of their way.
+
+        The way turns about the suture line into the half-plane while it closes in on the line, so
+        that no triangle is turned inside out.
+        """
+        arm = points - self.foot
+        x, y, z = (
+            np.einsum("jd,jd->j", arm, axis) for axis in (self.inward, self.normal, self.tangent)
+        )
+        angle = (1.0 - share) * np.arctan2(y, x)
+        radius = np.hypot(x, y) ** (1.0 - share) * self.reach**share
+        cosine, sine = (radius * np.cos(angle))[:, None], (radius * np.sin(angle))[:, None]
+        rest = ((1.0 - share) * z)[:, None]
+        return self.foot + cosine * self.inward + sine * self.normal + rest * self.tangent
+
+
+def blocked_row(
+    mesh: CuspMesh,
+    apex: Ints,
+    target: Floats,
+    conormal: Floats,
+    wedge: SignedDistance,
+    clearance: Floats,
+    slack: float,
+    upward: Floats,
+) -> LaidRow:
+    """The nodes that have no room in their half-plane.
+
+    Parameters
+    ----------
+    mesh : CuspMesh
+    apex : (k-1,) array
+        Node opposite each suture edge.
+    target : (k, 3) array
+        Sutured nodes in place [mm].
+    conormal : (k-1, 3) array
+        Outward conormal b of the suture edges: the cusp leaves along -b (3.1).
+    wedge : SignedDistance
+        The closed contact wedge.
+    clearance : (n,) array
+        d_0 of every node from it [mm].
+    slack : float
+        By how much d_0 may be missed [mm].
+    upward : (3,) array
+        n, normal of the plane of commissures, in which (1.6) measures the free edge's height.
+    """
+    ends = mesh.points[np.c_[mesh.suture_line[:-1], mesh.suture_line[1:]]]
+    side, arm = ends[:, 1] - ends[:, 0], mesh.points[apex] - ends[:, 0]
+    share = np.einsum("kd,kd->k", arm, side) / np.einsum("kd,kd->k", side, side)
+    height = np.linalg.norm(arm - share[:, None] * side, axis=1)
+    along = np.diff(target, axis=0)
+    tangent = along / np.linalg.norm(along, axis=1, keepdims=True)
+    inward = np.einsum("kd,kd->k", conormal, tangent)[:, None] * tangent - conormal
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    foot = target[:-1] + np.clip(share, 0.0, 1.0)[:, None] * along
+    at_free_edge = np.isin(apex, mesh.free_edge)
+    # the free edge keeps the height over its corner that the template gives it
+    corner = np.where(np.arange(len(apex)) < len(apex) / 2, 0, len(apex))
+    rise = mesh.points[apex, 1] - mesh.points[mesh.suture_line[corner], 1]
+    lifted = target[corner] + np.maximum(rise, 0.0)[:, None] * upward
+    foot[at_free_edge] = lifted[at_free_edge]
+    reach = np.linspace(0.0, 1.0, _SAMPLES + 1)[1:] * height[:, None]
+    samples = foot[:, None] + reach[..., None] * inward[:, None]
+    distance = wedge.evaluate(samples.reshape(-1, 3))[0].reshape(reach.shape)
+    clear = np.logical_and.accumulate(distance >= clearance[apex][:, None] - slack, axis=1)
+    room = np.maximum(clear.sum(axis=1) / _SAMPLES * height, slack)
+    blocked = (room < _ROOM * height) & ~np.isin(apex, mesh.suture_line)
+    order = np.flatnonzero(blocked)[np.argsort(room[blocked], kind="stable")]
+    nodes, first = np.unique(apex[order], return_index=True)
+    edge = order[first]
+    normal = np.cross(tangent[edge], -inward[edge])
+    return LaidRow(nodes, foot[edge], tangent[edge], inward[edge], normal, room[edge])
