@@ -92,6 +92,11 @@ class Mesh(Table):
     """Triangulation of the template."""
 
     size: Positive = Field(0.7, description="h, target edge length [mm]")
+    refinements: Annotated[int, Field(ge=0, le=8)] | None = Field(
+        None,
+        description="the cusp starts on a mesh of 2^refinements h, whose triangles are split into"
+        " four that many times on the way; default as many as leave it at most R/4",
+    )
 
 
 class Placement(Table):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from avneo_fem.scene_method import Clamp, Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
@@ -59,6 +60,14 @@ class Scene(Table):
     def mesh_size(self) -> float:
         """Target edge length after ``fidelity`` [mm]."""
         return self.mesh.size * FIDELITIES[self.fidelity]
+
+    @property
+    def refinements(self) -> int:
+        """How often the first mesh is split on the way to ``mesh_size``."""
+        chosen = self.mesh.refinements
+        if chosen is not None:
+            return chosen
+        return max(0, int(np.floor(np.log2(self.root.radius / 4 / self.mesh_size))))
 
     def inside_tolerance(self, thickness: float) -> float:
         """By how much a cusp of this thickness may be short of its clearances [mm]."""

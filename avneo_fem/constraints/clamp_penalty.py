@@ -46,6 +46,8 @@ class ClampPenalty:
     ----------
     turned : (k,) array
         Angles from which further rotations are counted [rad].
+    active : (k,) bool array
+        Edges the term acts on; all at first.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class ClampPenalty:
         self._inward = -across / np.linalg.norm(across, axis=1, keepdims=True)
         self._normal = np.cross(tangent, -self._inward)
         self.turned = np.zeros(len(apex))
+        self.active = np.ones(len(apex), dtype=bool)
         self._near, self._scale = np.zeros(len(apex), dtype=bool), np.ones(len(apex))
 
     def _polar(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -98,10 +101,14 @@ class ClampPenalty:
         arm = points[self.apex] - self._origin
         return np.einsum("kd,kd->k", arm, self._normal) / self._scale
 
+    @property
+    def _weights(self) -> Floats:
+        return self.lengths * self.active
+
     def energy(self, points: Floats) -> float:
         """Energy [mN mm]."""
         measure = np.where(self._near, self._height(points), self.angles(points))
-        return float(self.stiffness / 2 * np.dot(self.lengths, measure**2))
+        return float(self.stiffness / 2 * np.dot(self._weights, measure**2))
 
     def gradient(self, points: Floats) -> Floats:
         """(n, 3) [mN]."""
@@ -109,7 +116,7 @@ class ClampPenalty:
         slope = np.where(self._near[:, None], self._slope(), turning / square[:, None])
         measure = np.where(self._near, self._height(points), angle)
         result = np.zeros((self.count, 3))
-        np.add.at(result, self.apex, (self.stiffness * self.lengths * measure)[:, None] * slope)
+        np.add.at(result, self.apex, (self.stiffness * self._weights * measure)[:, None] * slope)
         return result
 
     def _slope(self) -> Floats:
@@ -124,5 +131,5 @@ class ClampPenalty:
         bend[self._near] = 0.0
         blocks = slope[:, :, None] * slope[:, None, :] + angle[:, None, None] * bend
         total = np.zeros((self.count, 3, 3))
-        np.add.at(total, self.apex, (self.stiffness * self.lengths)[:, None, None] * blocks)
+        np.add.at(total, self.apex, (self.stiffness * self._weights)[:, None, None] * blocks)
         return block_diagonal(total)

@@ -79,6 +79,8 @@ class NewtonSolver:
         self.general = Factorization(symmetric=False)
         self.iterations, self.hindered, self.looks = 0, 0, 0
         self._shift, self._hold, self._convex = 0.0, 0, False
+        self._base: Floats = np.empty(0)
+        self._asked = self._share = 0.0
 
     # -- pieces SNES calls ---------------------------------------------------------------------
     def _full(self, reduced: Any) -> Floats:

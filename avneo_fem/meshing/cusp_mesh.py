@@ -89,9 +89,13 @@ class CuspMesh:
     @cached_property
     def suture_edges(self) -> Ints:
         """(k-1,) edge index of each piece of the suture line, from N_0 to N_1."""
-        pairs = np.sort(np.c_[self.suture_line[:-1], self.suture_line[1:]], axis=1)
-        keys = self.edges[:, 0] * len(self.points) + self.edges[:, 1]
-        return np.searchsorted(keys, pairs[:, 0] * len(self.points) + pairs[:, 1])
+        return self.edges_between(self.suture_line)
+
+    def edges_between(self, chain: Ints) -> Ints:
+        """(j-1,) edge index of each piece of a chain of nodes (j,)."""
+        base = np.array([len(self.points), 1])
+        pairs = np.sort(np.c_[chain[:-1], chain[1:]], axis=1)
+        return np.searchsorted(self.edges @ base, pairs @ base)
 
     @cached_property
     def distance_to_suture(self) -> Floats:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from avneo_fem.errors import SceneError
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 
-__all__ = ["triangulate_template"]
+__all__ = ["TemplateOutline", "triangulate_template"]
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,9 @@ class _Path(Protocol):
     def point(self, s: Floats) -> Floats: ...
 
 
-class _Template(Protocol):
+class TemplateOutline(Protocol):
+    """The two boundary curves of a template."""
+
     @property
     def suture_line(self) -> _Path: ...
     @property
@@ -39,7 +41,7 @@ def _divide(breaks: Floats, size: float) -> Floats:
     return np.r_[np.concatenate(parts), breaks[-1]]
 
 
-def triangulate_template(template: _Template, size: float) -> CuspMesh:
+def triangulate_template(template: TemplateOutline, size: float) -> CuspMesh:
     """Mesh a template with target edge length ``size`` [mm].
 
     The boundary is divided evenly in arc length between the joints of its curves, so boundary

@@ -41,6 +41,8 @@ class LaidRow:
         Frame of the half-plane: along the suture line, into the half-plane, and across it.
     reach : (j,) array
         Distance from the suture line that the clearance allows [mm].
+    is_blocked : (k-1,) bool array
+        Suture edges whose triangle this is about.
     """
 
     nodes: Ints
@@ -49,11 +51,7 @@ class LaidRow:
     inward: Floats
     normal: Floats
     reach: Floats
-
-    @property
-    def places(self) -> Floats:
-        """(j, 3) where the nodes belong [mm]."""
-        return self.foot + self.reach[:, None] * self.inward
+    is_blocked: NDArray[np.bool_]
 
     def on_the_way(self, points: Floats, share: float) -> Floats:
         """(j, 3) places of nodes at ``points`` (j, 3) after ``share`` of their way.
@@ -127,4 +125,5 @@ def blocked_row(
     nodes, first = np.unique(apex[order], return_index=True)
     edge = order[first]
     normal = np.cross(tangent[edge], -inward[edge])
-    return LaidRow(nodes, foot[edge], tangent[edge], inward[edge], normal, room[edge])
+    laid = np.isin(apex, nodes)
+    return LaidRow(nodes, foot[edge], tangent[edge], inward[edge], normal, room[edge], laid)

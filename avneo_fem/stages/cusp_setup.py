@@ -78,11 +78,13 @@ class CuspSetup:
         Which cusp.
     mesh : CuspMesh
         Its triangulated template.
+    start : (n, 3) array or None
+        Where the nodes start [mm]; None: the template is placed as in the paper.
 
     Attributes
     ----------
     start : (n, 3) array
-        Placed flat template; ``placement_k`` is the k of its search.
+        First positions; ``placement_k`` is the k of the paper's search, 0 without one.
     target : (k, 3) array
         Where the sutured nodes go.
     conormal : (k-1, 3) array
@@ -96,10 +98,11 @@ class CuspSetup:
         wedges: ContactWedgeFamily,
         index: int,
         mesh: CuspMesh,
+        start: Floats | None = None,
     ) -> None:
         self.scene, self.wedges, self.index, self.mesh = scene, wedges, index, mesh
         self.geometry, self.cusp = geometry, geometry.cusps[index]
-        self.start, self.placement_k = self._place()
+        self.start, self.placement_k = self._place() if start is None else (start, 0)
         clock = time.perf_counter()
         self.model = ShellModel(mesh, self._parameters())
         self.compile_seconds = time.perf_counter() - clock
@@ -109,11 +112,22 @@ class CuspSetup:
         self.wall, self.wedge = self._penalties()
         self.clamp = self._clamp()
         self.row = self._blocked_row()
+        self.clamp.active = ~self.row.is_blocked
         membrane = scene.material.young_modulus * self.cusp.thickness
         self.contact = self._self_contact(membrane)
         self.system = CuspSystem(self.model, self.contact)
         self.system.fix(self.model.position_dofs[mesh.suture_line])
         self._solver(membrane / geometry.commissures.circumradius**2)
+
+    def on_mesh(self, mesh: CuspMesh, start: Floats) -> CuspSetup:
+        """The same cusp on another mesh, its penalties as stiff as they are now."""
+        other = CuspSetup(self.scene, self.geometry, self.wedges, self.index, mesh, start)
+        other.compile_seconds += self.compile_seconds
+        other.newton.iterations = self.newton.iterations
+        other.wall.stiffness, other.wedge.stiffness = self.wall.stiffness, self.wedge.stiffness
+        other.clamp.stiffness = self.clamp.stiffness
+        other.wedge.field = self.wedge.field
+        return other
 
     def _place(self) -> tuple[Floats, int]:
         plane, scene, i = self.geometry.commissures, self.scene, self.index
@@ -194,7 +208,8 @@ class CuspSetup:
         if distance is None:
             distance = min(0.3 * self.cusp.thickness, 0.2 * self.scene.mesh_size)
         stiffness = options.barrier_stiffness * membrane / distance**2
-        return SelfContact(self.start, self.mesh.triangles, distance, stiffness)
+        rest = np.c_[self.mesh.points, np.zeros(len(self.mesh.points))]
+        return SelfContact(rest, self.mesh.triangles, distance, stiffness)
 
     def _solver(self, unit: float) -> None:
         """``unit`` is the membrane's stiffness E H / R^2 [kPa/mm], which scales all damping."""

@@ -1,17 +1,19 @@
 """All stages of one cusp, from the flat template to its place in the root.
 
 Order and reasons (design.md §3): bending is on from the first step and the state never crosses
-itself. ``boundary`` moves the sutured edge to its line in damped steps. ``hinged_edge`` takes the
-damping out, with the wall present (paper §3.2 step 3). ``clamped_edge`` turns the edge into its
-tangent half-plane (step 4). ``contact_wedge`` closes the wedge, lambda = 0 ... 1 (§3.4 step 2).
-``root_wall`` raises the penalties of wall, wedge and clamp until each holds (step 3).
-``equilibrium`` converges the result.
+itself. On a coarse mesh, ``boundary`` moves the sutured edge to its line in damped steps,
+``hinged_edge`` takes the damping out, with the wall present (paper §3.2 step 3), ``clamped_edge``
+turns the edge into its tangent half-plane (step 4), and ``contact_wedge`` closes the wedge,
+lambda = 0 ... 1 (§3.4 step 2). Each ``refinement`` splits the triangles into four and goes on from
+the same surface, which is free of crossings, too. ``first_row`` lays down what has no room in its
+half-plane (``stages.blocked_edge``), ``root_wall`` raises the penalties of wall, wedge and clamp
+until each holds (step 3), and ``equilibrium`` converges the result.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +21,13 @@ from numpy.typing import NDArray
 from avneo_fem.constraints.clamp_penalty import ClampPenalty
 from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
 from avneo_fem.equilibrium.directors import clamp_rotation, renew_directors, start_directors
+from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.harmonic import harmonic_extension
+from avneo_fem.meshing.refine import prolong
 from avneo_fem.stages.checkpoint import Checkpoint, CheckpointStore
 from avneo_fem.stages.continuation import Attempt, StageFailed, march
 from avneo_fem.stages.cusp_setup import CuspSetup
+from avneo_fem.stages.levels import Level, levels_of
 from avneo_fem.stages.record import CuspResult, Snapshot, StageRecord
 
 __all__ = ["CuspSuturing"]
@@ -35,7 +40,6 @@ _FIRST_PRESSURE = 0.05
 #: first dampings, in units of E H / R^2
 _BOUNDARY_DAMPING, _SETTLE_DAMPING = 1.5, 0.6
 _BOUNDARY_ITERATIONS = 6
-_BOUNDARY_LEVELS = 10
 
 
 class CuspSuturing:
@@ -49,6 +53,8 @@ class CuspSuturing:
         Told the cusp's index and every completed level.
     store : CheckpointStore or None
         Where progress is kept.
+    finer : sequence of CuspMesh
+        Refinements of the set-up's mesh, to go on with one after the other.
     """
 
     def __init__(
@@ -56,25 +62,29 @@ class CuspSuturing:
         setup: CuspSetup,
         observer: Callable[[int, StageRecord], None],
         store: CheckpointStore | None = None,
+        finer: Sequence[CuspMesh] = (),
     ) -> None:
-        self.setup, self.observer, self.store = setup, observer, store
+        self.setup, self.observer, self.store, self.finer = setup, observer, store, finer
+        self.levels = levels_of(setup.scene, setup.placement_k, finer)
         self.options = setup.scene.solver
         self.records: list[StageRecord] = []
         self.snapshots: list[Snapshot] = []
 
     def run(self, resume: bool = False) -> CuspResult:
         """Run all stages; a failure is part of the result, with the last good state."""
-        clock, setup = time.perf_counter(), self.setup
-        state, done = self._begin()
-        checkpoint = self.store.load(setup.index) if resume and self.store else None
+        clock = time.perf_counter()
+        state, done = self._begin(), 0
+        checkpoint = self.store.load(self.setup.index) if resume and self.store else None
         if checkpoint is not None:
             state, done = self._go_on_from(checkpoint), checkpoint.levels_done
         if checkpoint is not None and checkpoint.finished:
             failure, residual = checkpoint.failure, checkpoint.residual
         else:
             state, failure = self._run_from(state, done)
-            residual = setup.system.relative_residual(state)
+            residual = self.setup.system.relative_residual(state)
+            done = len(self.levels) if failure is None else self._reached
             self._save(state, done, True, residual, failure)
+        setup = self.setup
         return CuspResult(
             index=setup.index,
             mesh=setup.mesh,
@@ -90,29 +100,55 @@ class CuspSuturing:
 
     def _run_from(self, state: Floats, done: int) -> tuple[Floats, str | None]:
         """All levels after the first ``done``; last good state, and what failed if anything did."""
+        self._reached = done
         try:
-            for number, (name, before, after) in enumerate(self._levels()):
+            for number, level in enumerate(self.levels):
                 if number < done:
-                    self._activate(name, after)
-                else:
-                    self._activate(name, before)
-                    state = self._level(state, name, before, after, number + 1)
+                    self._activate(level, level.stop)
+                    continue
+                if level.name == "refinement":
+                    state = self._enter_mesh(level, state)
+                self._activate(level, level.start)
+                self._reached = number
+                state = self._level(state, level, number + 1)
             return self._raise_until_inside(state), None
         except StageFailed as error:
             return error.state, str(error)
 
-    def _begin(self) -> tuple[Floats, int]:
-        """First state, and no level behind it."""
+    def _begin(self) -> Floats:
+        """First state: the nodes at their start."""
         setup, model = self.setup, self.setup.model
         line = setup.mesh.suture_line
         away = setup.target - setup.start[line]
         self._way = harmonic_extension(setup.mesh, line, away)
         state = np.zeros(model.size)
         state[model.position_dofs] = setup.start
-        return start_directors(model, state), 0
+        return start_directors(model, state)
+
+    def _enter_mesh(self, level: Level, state: Floats) -> Floats:
+        """Go over to the next finer mesh: the same surface, all terms as they are."""
+        coarse = self.setup
+        points = prolong(coarse.mesh, coarse.system.positions(state))
+        self.setup = coarse.on_mesh(self.finer[level.mesh - 1], points)
+        self.snapshots = [
+            Snapshot(
+                shot.name,
+                shot.parameter,
+                prolong(coarse.mesh, shot.points),
+                {name: prolong(coarse.mesh, field) for name, field in shot.fields.items()},
+            )
+            for shot in self.snapshots
+        ]
+        for earlier in self.levels[: self.levels.index(level)]:
+            self._activate(earlier, earlier.stop)
+        return self._begin()
 
     def _go_on_from(self, checkpoint: Checkpoint) -> Floats:
         """Take over what a checkpoint holds; its state."""
+        behind = self.levels[: checkpoint.levels_done + checkpoint.finished]
+        mesh = max((level.mesh for level in behind), default=0)
+        if mesh:
+            self.setup = self.setup.on_mesh(self.finer[mesh - 1], checkpoint.snapshots[-1].points)
         setup = self.setup
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         stiffness = checkpoint.penalty_stiffness
@@ -156,43 +192,38 @@ class CuspSuturing:
         self.store.save(setup.index, kept)
 
     # -- levels ----------------------------------------------------------------------------
-    def _levels(self) -> list[tuple[str, float, float]]:
-        """(stage, parameter before, parameter after) of all levels known beforehand."""
-        scene = self.setup.scene
-        levels = [("placement", 0.0, float(self.setup.placement_k))]
-        count = _BOUNDARY_LEVELS
-        levels += [("boundary", k / count, (k + 1) / count) for k in range(count)]
-        levels += [("hinged_edge", 0.0, 1.0)]
-        if scene.material.bending:
-            count = scene.solver.clamp_steps
-            levels += [("clamped_edge", k / count, (k + 1) / count) for k in range(count)]
-        count = scene.contact.steps
-        # lambda = 0 is a level of its own: there the wedge appears
-        levels += [("contact_wedge", (k - 1) / count, k / count) for k in range(count + 1)]
-        return levels
-
-    def _activate(self, name: str, parameter: float) -> None:
-        """Terms and held angles that come with a level; they stay for all later ones.
+    def _activate(self, level: Level, parameter: float) -> None:
+        """Terms and held unknowns that come with a level; they stay for all later ones.
 
         ``parameter`` is where the level starts, or its end when it is behind the state.
         """
-        setup = self.setup
+        setup, name = self.setup, level.name
         if name == "hinged_edge":
             # from here on the cusp must not slip behind its own sutured edge
             setup.system.terms = [setup.wall]
         elif name == "clamped_edge":
-            setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
-            setup.system.fix(setup.model.position_dofs[setup.row.nodes])
+            setup.system.fix(setup.model.angle_dofs[self._suture_edges(~setup.row.is_blocked)])
             setup.system.terms = [setup.wall, setup.clamp]
         elif name == "contact_wedge":
             clamp = [setup.clamp] if setup.scene.material.bending else []
             setup.system.terms = [setup.wall, *clamp, setup.wedge]
             setup.wedge.field = setup.wedges.wedge(setup.index, max(parameter, 0.0))
-        if name != "boundary":
+        elif name == "first_row":
+            setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
+            setup.system.fix(setup.model.position_dofs[setup.row.nodes])
+            setup.clamp.active[:] = True
+        if name not in ("placement", "boundary"):
             setup.model.pressure = setup.scene.diastolic_pressure
 
-    def _level(self, state: Floats, name: str, before: float, after: float, done: int) -> Floats:
+    def _suture_edges(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        return self.setup.mesh.suture_edges[chosen]
+
+    def _mesh_size(self, level: Level) -> float:
+        return float(self.setup.scene.mesh_size * 2.0 ** (len(self.finer) - level.mesh))
+
+    def _level(self, state: Floats, level: Level, done: int) -> Floats:
         """Run one level and keep its verdict, also when it fails."""
+        name, before, after = level.name, level.start, level.stop
         attempt, step, reason = {
             "placement": (None, 1.0, "placed clear of the suture line"),
             "boundary": (
@@ -203,6 +234,8 @@ class CuspSuturing:
             "hinged_edge": (self._settle_hinged, 1.0, ""),
             "clamped_edge": (self._turn_edge, after - before, ""),
             "contact_wedge": (self._close_wedge, after - before, ""),
+            "refinement": (self._follow_mesh, 1.0, ""),
+            "first_row": (self._lay_row, after - before, ""),
         }[name]
         clock, used = time.perf_counter(), self.setup.newton.iterations
         failure, steps = None, 1
@@ -217,7 +250,8 @@ class CuspSuturing:
                 reason, after, steps = str(error), error.parameter, error.steps
         # a failed level is no place to go on from: it would be run again from its middle
         kept = done if failure is None else None
-        self._keep(state, name, after, used, reason, clock, steps, kept)
+        parameter = self._mesh_size(level) if name == "refinement" else after
+        self._keep(state, name, parameter, used, reason, clock, steps, kept)
         if failure is not None:
             raise failure
         return state
@@ -289,6 +323,11 @@ class CuspSuturing:
 
     def _move_boundary(self, state: Floats, start: float, stop: float) -> Outcome:
         """Move the sutured edge on its straight way; the inside follows harmonically."""
+        model = self.setup.model
+        model.pressure = self.setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, stop)
+        return self._move(state, start, stop)
+
+    def _move(self, state: Floats, start: float, stop: float) -> Outcome:
         setup, model = self.setup, self.setup.model
         move = (stop - start) * self._way
         clear = setup.contact.step_fraction(setup.system.positions(state), move)
@@ -300,8 +339,25 @@ class CuspSuturing:
         trial[model.position_dofs[line]] = setup.start[line] + stop * (
             setup.target - setup.start[line]
         )
-        model.pressure = setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, stop)
         return self._damped(trial)
+
+    def _follow_mesh(self, state: Floats, start: float, stop: float) -> Outcome:
+        """Move the new sutured nodes to their line; once there, clamp them and settle."""
+        moved, reason = self._move(state, start, stop)
+        if moved is None or stop < 1.0:
+            return moved, reason
+        return self._settle(self._turned(moved, ~self.setup.row.is_blocked, 1.0))
+
+    def _turned(self, state: Floats, chosen: NDArray[np.bool_], share: float) -> Floats:
+        """State with chosen suture edges (k-1,) turned by a share of what is missing to the
+        tangent half-plane."""
+        setup, model = self.setup, self.setup.model
+        if not model.parameters.bending:
+            return state
+        state = renew_directors(model, state)
+        rest = clamp_rotation(model, state, setup.conormal)
+        state[model.angle_dofs[self._suture_edges(chosen)]] += share * rest[chosen]
+        return state
 
     def _damped(self, trial: Floats) -> Outcome:
         relaxation = self.setup.relaxation
@@ -316,33 +372,28 @@ class CuspSuturing:
 
         The penalty that takes the triangles along grows with it, by a factor of 4 a level.
         """
-        setup, model = self.setup, self.setup.model
-        state = renew_directors(model, state)
-        rest = clamp_rotation(model, state, setup.conormal)
-        share = (stop - start) / (1.0 - start)
-        trial, reason = self._lay_row(state, share)
-        if trial is None:
-            return None, reason
-        trial[model.angle_dofs[setup.mesh.suture_edges]] += share * rest
+        setup, free = self.setup, ~self.setup.row.is_blocked
+        trial = self._turned(state, free, (stop - start) / (1.0 - start))
         full, count = setup.scene.clamp.stiffness, self.options.clamp_steps
         setup.clamp.stiffness = full * 4.0 ** (count * (stop - 1.0))
         return self._settle(trial)
 
-    def _lay_row(self, state: Floats, share: float) -> Outcome:
-        """Move the nodes without room in their half-plane by a share of their way."""
-        setup, row, trial = self.setup, self.setup.row, state.copy()
-        points = setup.system.positions(state)
-        held = np.r_[setup.mesh.suture_line, row.nodes]
-        away = np.zeros((len(held), 3))
-        away[len(setup.mesh.suture_line) :] = (
-            row.on_the_way(points[row.nodes], share) - points[row.nodes]
-        )
-        move = harmonic_extension(setup.mesh, held, away)
+    def _lay_row(self, state: Floats, start: float, stop: float) -> Outcome:
+        """Lay down the nodes that have no room in their half-plane, and clamp their edges."""
+        setup, row = self.setup, self.setup.row
+        if not len(row.nodes):
+            return state, "converged: every node has room in its half-plane"
+        share = (stop - start) / (1.0 - start)
+        points, line = setup.system.positions(state), setup.mesh.suture_line
+        away = row.on_the_way(points[row.nodes], share) - points[row.nodes]
+        held = np.r_[line, row.nodes]
+        move = harmonic_extension(setup.mesh, held, np.vstack([np.zeros((len(line), 3)), away]))
         clear = setup.contact.step_fraction(points, move)
         if clear < 1.0:
             return None, f"layers would collide after {clear:.2f} of the step"
+        trial = state.copy()
         trial[setup.model.position_dofs] += move
-        return trial, ""
+        return self._settle(self._turned(trial, row.is_blocked, share))
 
     def _close_wedge(self, state: Floats, _start: float, stop: float) -> Outcome:
         self.setup.wedge.field = self.setup.wedges.wedge(self.setup.index, max(stop, 0.0))
@@ -425,7 +476,7 @@ class CuspSuturing:
         state, verdict = relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
         stiffness = self.setup.wall.stiffness
         # after the last equilibrium comes the checkpoint of the finished cusp
-        done = None if name == "equilibrium" else len(self._levels())
+        done = None if name == "equilibrium" else len(self.levels)
         self._keep(state, name, stiffness, used, verdict.reason, clock, 1, done)
         if not verdict.converged:
             message = (

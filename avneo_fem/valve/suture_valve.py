@@ -8,7 +8,7 @@ from typing import Any
 from avneo_fem.compat import MPI, clear_stale_kernels
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.cusp_mesh import CuspMesh
-from avneo_fem.meshing.triangulate import triangulate_template
+from avneo_fem.meshing.refine import nested_meshes
 from avneo_fem.scene import Template
 from avneo_fem.stages.checkpoint import CheckpointStore
 from avneo_fem.stages.cusp_setup import CuspSetup
@@ -19,18 +19,21 @@ from avneo_fem.valve.congruence import representatives, rotate_result
 __all__ = ["mesh_templates", "suture_valve"]
 
 
-def mesh_templates(given: ValveInput) -> dict[Template, CuspMesh]:
-    """A mesh of every different template of a scene; the same on all ranks.
+def mesh_templates(given: ValveInput) -> dict[Template, list[CuspMesh]]:
+    """Nested meshes of every different template, from coarse to fine; the same on all ranks.
 
     Raises
     ------
     SceneError
         When ``mesh.size`` is too large for one of them.
     """
-    meshes: dict[Template, CuspMesh] = {}
+    meshes: dict[Template, list[CuspMesh]] = {}
     for table, cusp in zip(given.scene.cusp, given.geometry.cusps, strict=True):
         if table.template not in meshes:
-            meshes[table.template] = triangulate_template(cusp.template, given.scene.mesh_size)
+            scene = given.scene
+            meshes[table.template] = nested_meshes(
+                cusp.template, scene.mesh_size, scene.refinements, scene.mesh.refinements is None
+            )
     return meshes
 
 
@@ -41,7 +44,7 @@ def suture_valve(
     resume: bool = False,
     only: int | None = None,
     comm: Any = MPI.COMM_WORLD,
-    meshes: dict[Template, CuspMesh] | None = None,
+    meshes: dict[Template, list[CuspMesh]] | None = None,
 ) -> list[CuspResult]:
     """Run the stages of every cusp.
 
@@ -82,9 +85,9 @@ def suture_valve(
     for number, index in enumerate(to_solve):
         if number % comm.size != comm.rank:
             continue
-        mesh = meshes[scene.cusp[index].template]
-        setup = CuspSetup(scene, given.geometry, given.wedges, index, mesh)
-        mine.append(CuspSuturing(setup, observer, store).run(resume))
+        first, *finer = meshes[scene.cusp[index].template]
+        setup = CuspSetup(scene, given.geometry, given.wedges, index, first)
+        mine.append(CuspSuturing(setup, observer, store, finer).run(resume))
     gathered = comm.gather(mine, root=0)
     if comm.rank != 0:
         return []
