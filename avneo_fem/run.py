@@ -115,7 +115,7 @@ def _finish(
     failures = [
         f"cusp {result.index}: {result.failure}" for result in results if result.failure is not None
     ]
-    failures += judge(verification, tolerances_of(scene, geometry))
+    failures += judge(verification, tolerances_of(given))
     for result in results:
         write_stl(
             folder / f"cusp_{result.index}.stl",

@@ -38,8 +38,10 @@ class Rank:
 class FakeSuturing:
     """Solves nothing; the result says which cusp and mesh it was asked for."""
 
-    def __init__(self, setup: tuple[int, Any], _observer: Any, _store: Any) -> None:
-        self.index, self.mesh = setup
+    def __init__(
+        self, setup: tuple[int, Any], _observer: Any, _store: Any, _finer: Any, index: int
+    ) -> None:
+        self.index, self.mesh = index, setup[1]
 
     def run(self, resume: bool) -> CuspResult:
         points = np.zeros((2, 3))

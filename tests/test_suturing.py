@@ -103,18 +103,19 @@ def test_order_of_the_stages(done: Done) -> None:
     scene asks for; no failure; the observer saw the same records, in order."""
     names, parameters = done.names, [record.parameter for record in done.result.records]
     assert done.result.failure is None
-    assert names[:19] == (
+    assert names[:21] == (
         ["placement"]
         + ["boundary"] * 10
         + ["hinged_edge"]
         + ["clamped_edge"] * 2
         + ["contact_wedge"] * 5
+        + ["first_row"] * 2
     )
     assert parameters[0] == done.setup.placement_k
     np.testing.assert_allclose(parameters[1:11], np.arange(1, 11) / 10)
     assert parameters[11:14] == [1.0, 0.5, 1.0]
     assert parameters[14:19] == LAMBDAS
-    assert set(names[19:-1]) <= {"root_wall"}
+    assert set(names[21:-1]) <= {"root_wall"}
     assert names[-1] == "equilibrium"
     assert done.seen == [(1, record) for record in done.result.records]
     shots = done.result.snapshots
@@ -217,7 +218,7 @@ def test_snapshot_fields(done: Done) -> None:
 def test_clearances_out_of_reach(done: Done, tmp_path: Path) -> None:
     """Truth: penalties that may not be raised cannot keep clearances to a micrometre: the run ends
     in undamped equilibrium all the same, and says what is missing and what to change."""
-    run = after(done, 19, tmp_path, set_up(FAILING)).run()
+    run = after(done, 21, tmp_path, set_up(FAILING)).run()
     assert run.result.failure is not None
     assert run.result.failure.startswith("root_wall: ")
     wall, wedge, clamp = run.suturing.shortfalls(run.result.points)
@@ -230,21 +231,22 @@ def test_clearances_out_of_reach(done: Done, tmp_path: Path) -> None:
         "raise maximum_stiffness of wall, contact or clamp",
     ):
         assert text in run.result.failure
-    assert run.names[19:] == ["equilibrium"]  # nothing could be raised
+    assert run.names[21:] == ["equilibrium"]  # nothing could be raised
     assert run.result.residual <= 1e-8
 
 
 def test_stiffness_is_raised_as_said(done: Done, tmp_path: Path) -> None:
     """Truth: eta_1 grows from level to level until the clearances hold, by ``growth`` at most, and
     only of what misses its own; the last equilibrium is reached with those values."""
-    tight = {"inside_tolerance": 0.05}
-    run = after(done, 19, tmp_path, set_up(solver=tight, wall={"growth": 3.0})).run()
+    # triangles of 3 mm that keep H/2 off the wall at their far end are 5 degrees off it
+    tight, loose = {"inside_tolerance": 0.05}, {"tolerance_degrees": 7.0}
+    run = after(done, 21, tmp_path, set_up(solver=tight, wall={"growth": 3.0}, clamp=loose)).run()
     raised = [record for record in run.result.records if record.name == "root_wall"]
     assert run.result.failure is None
     assert raised
     misses = run.suturing.shortfalls(run.result.points)
     assert max(misses[:2]) <= 0.05
-    assert misses[2] <= 5.0
+    assert misses[2] <= 7.0
     terms = (run.setup.wall, run.setup.wedge, run.setup.clamp)
     stiffness = np.array([term.stiffness for term in terms])
     powers = np.log(stiffness / [64.0, 16.0, 1e4]) / np.log(3.0)
@@ -322,7 +324,7 @@ def untimed(records: list[StageRecord]) -> list[tuple[Any, ...]]:
     return [(r.name, r.parameter, r.iterations, r.reason, r.substeps) for r in records]
 
 
-@pytest.mark.parametrize("level", [6, 12, 17, 19])
+@pytest.mark.parametrize("level", [6, 12, 17, 20])
 def test_going_on(done: Done, tmp_path: Path, level: int) -> None:
     """Truth: the uninterrupted run, wherever the process was killed: the same levels, none twice,
     the same state after each to 1e-9 mm."""
@@ -400,7 +402,7 @@ def test_without_bending(tmp_path: Path) -> None:
     assert found is not None
     assert found.directors.shape == (0, 3)
     assert [record.name for record in found.records] == ["placement"] + ["boundary"] * 3
-    names = [name for name, *_ in suturing._levels()]
+    names = [level.name for level in suturing.levels]
     assert "clamped_edge" not in names
     assert names.count("contact_wedge") == 5
 

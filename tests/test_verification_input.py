@@ -140,7 +140,7 @@ def test_tolerances(tables: dict[str, Any], cusps: float, wall: float) -> None:
     """Truth: by hand: mid-surfaces of two cusps keep the sum of their clearances, but no more than
     their sutured ends are apart (2 R sin(gap/2R)); the wall its clearance."""
     scene = parse_scene(tables | {"solver": {"tolerance": 1e-7, "inside_tolerance": 0.03}})
-    found = tolerances_of(scene, ValveInput.from_scene(scene).geometry)
+    found = tolerances_of(ValveInput.from_scene(scene))
     assert found.cusp_distance_mm == pytest.approx(cusps, rel=1e-12)
     assert found.wall_distance_mm == pytest.approx(wall)
     assert (found.residual, found.inside_mm) == (1e-7, 0.03)
@@ -153,7 +153,7 @@ def test_the_clamp_is_judged_with_bending_only() -> None:
     for bending, expected in ((True, 3.0), (False, np.inf)):
         tables = {"clamp": {"tolerance_degrees": 3.0}, "material": {"bending": bending}}
         scene = parse_scene(tables)
-        assert tolerances_of(scene, ValveInput.from_scene(scene).geometry).clamp_deg == expected
+        assert tolerances_of(ValveInput.from_scene(scene)).clamp_deg == expected
 
 
 def test_the_index_of_the_result_decides() -> None:

@@ -27,6 +27,11 @@ _NEAR = np.radians(60.0)
 class ClampPenalty:
     """Energy k/2 sum_e l_e theta_e^2 over the suture edges, which do not move.
 
+    For edges that were within 60 degrees of their half-plane at the last :meth:`renew`, theta is
+    measured as the apex's height over the half-plane in units of its distance from the edge at
+    that time. To first order that is the angle, but it has no singularity where a triangle is
+    squeezed against its edge, and its Hessian is positive.
+
     Parameters
     ----------
     count : int
@@ -44,8 +49,9 @@ class ClampPenalty:
 
     Attributes
     ----------
-    turned : (k,) array
-        Angles from which further rotations are counted [rad].
+    reference : (2, k) array
+        What :meth:`renew` notes: the angles from which further rotations are counted [rad], and
+        the distances of the apexes from their edges [mm], infinite before the first renewal.
     active : (k,) bool array
         Edges the term acts on; all at first.
     """
@@ -67,20 +73,19 @@ class ClampPenalty:
         self._origin = edges[:, 0]
         self._inward = -across / np.linalg.norm(across, axis=1, keepdims=True)
         self._normal = np.cross(tangent, -self._inward)
-        self.turned = np.zeros(len(apex))
+        self.reference = np.stack([np.zeros(len(apex)), np.full(len(apex), np.inf)])
         self.active = np.ones(len(apex), dtype=bool)
-        self._near, self._scale = np.zeros(len(apex), dtype=bool), np.ones(len(apex))
 
     def _polar(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Angle, squared distance from the edge, and the arm across it: radial, turned by 90."""
-        cosine, sine = np.cos(self.turned)[:, None], np.sin(self.turned)[:, None]
+        cosine, sine = np.cos(self.reference[0])[:, None], np.sin(self.reference[0])[:, None]
         first = cosine * self._inward + sine * self._normal
         second = cosine * self._normal - sine * self._inward
         arm = points[self.apex] - self._origin
         x, y = np.einsum("kd,kd->k", arm, first), np.einsum("kd,kd->k", arm, second)
         radial = x[:, None] * first + y[:, None] * second
         turning = x[:, None] * second - y[:, None] * first
-        return self.turned + np.arctan2(y, x), x**2 + y**2, radial, turning
+        return self.reference[0] + np.arctan2(y, x), x**2 + y**2, radial, turning
 
     def angles(self, points: Floats) -> Floats:
         """(k,) theta_e from -b towards t x b, counted without a jump since :meth:`renew` [rad]."""
@@ -92,9 +97,16 @@ class ClampPenalty:
 
     def renew(self, points: Floats) -> None:
         """Count further rotations, and measure heights, from the present state."""
-        self.turned, square, _, _ = self._polar(points)
-        self._near = np.abs(self.turned) < _NEAR
-        self._scale = np.where(self._near, np.sqrt(square), 1.0)
+        angle, square, _, _ = self._polar(points)
+        self.reference = np.stack([angle, np.sqrt(square)])
+
+    @property
+    def _near(self) -> NDArray[np.bool_]:
+        return np.isfinite(self.reference[1]) & (np.abs(self.reference[0]) < _NEAR)
+
+    @property
+    def _scale(self) -> Floats:
+        return np.where(self._near, self.reference[1], 1.0)
 
     def _height(self, points: Floats) -> Floats:
         """(k,) height of the apex over the half-plane in units of its arm at renewal."""

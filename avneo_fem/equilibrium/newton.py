@@ -29,6 +29,9 @@ Floats = NDArray[np.float64]
 
 #: times at most that a direction is corrected for penalties it switches on or off
 _FORESIGHT = 4
+#: a step is short below this share of what was asked; bt often takes exactly 1/2 or 1/4, which
+#: rounding must not decide on
+_SHORT = 0.4
 
 _REASONS = {
     2: "converged: residual below tolerance",
@@ -78,9 +81,13 @@ class NewtonSolver:
         self.symmetric = Factorization(symmetric=True)
         self.general = Factorization(symmetric=False)
         self.iterations, self.hindered, self.looks = 0, 0, 0
-        self._shift, self._hold, self._convex = 0.0, 0, False
+        self.forget()
         self._base: Floats = np.empty(0)
         self._asked = self._share = 0.0
+
+    def forget(self) -> None:
+        """Begin the next solve without the shift that the last ones needed."""
+        self._shift, self._hold, self._convex = 0.0, 0, False
 
     # -- pieces SNES calls ---------------------------------------------------------------------
     def _full(self, reduced: Any) -> Floats:
@@ -128,8 +135,8 @@ class NewtonSolver:
     def _descent(self, force: Floats) -> Floats:
         """Newton direction of a model made convex by the smallest shift of a geometric series."""
         settings = self.settings
-        shift = self._shift
         close = bool(np.linalg.norm(force) < settings.exact_below * self._scale)
+        shift = 0.0 if close and not self._hold else self._shift
         if close and self._convex:
             # the iteration before was convex, and steps are small now: its inertia will do
             with suppress(FactorizationError):
@@ -206,9 +213,9 @@ class NewtonSolver:
         if self._asked == 0.0:
             return
         share = self._share * float(np.linalg.norm(taken)) / self._asked
-        self.hindered += self._shift > 0.0 or share < 0.5
+        self.hindered += self._shift > 0.0 or share < _SHORT
         first = self.settings.first_shift
-        if share <= 0.5:
+        if share < _SHORT:
             self._shift = max(2 * self._shift, 0.5 * first)
         elif self._hold > 0:
             self._hold -= 1  # a smaller one was refused not long ago

@@ -49,3 +49,18 @@ class ValveInput:
             for step in range(scene.contact.steps + 1):
                 wedges.wedge(index, step / scene.contact.steps)
         return cls(scene, geometry, wedges)
+
+    def seen_from(self, index: int) -> ValveInput:
+        """The same valve with cusp ``index`` as cusp 0, turned about the axis accordingly.
+
+        Congruent cusps then have the same numbers, to the last bit: so they come out the same.
+        """
+        if index == 0:
+            return self
+        cusps = self.scene.cusp[index:] + self.scene.cusp[:index]
+        ratio = self.scene.commissures.chord_ratio
+        commissures = self.scene.commissures.model_copy(
+            update={"chord_ratio": ratio[index:] + ratio[:index]}
+        )
+        scene = self.scene.model_copy(update={"cusp": cusps, "commissures": commissures})
+        return ValveInput.from_scene(scene)

@@ -10,6 +10,7 @@ import numpy as np
 
 from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
 from avneo_fem.geometry.valve_geometry import ValveGeometry
+from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.results.verdict import Tolerances
 from avneo_fem.results.verify import Constraints, CuspSurface
 from avneo_fem.scene import Scene
@@ -55,23 +56,40 @@ def constraints_of(
     )
 
 
-def tolerances_of(scene: Scene, geometry: ValveGeometry) -> Tolerances:
+def _edges_apart(given: ValveInput) -> float:
+    """Smallest sum of the distances of two neighbouring sutured edges from the closed wedge [mm].
+
+    A cusp keeps its clearance from the wedge but where its sutured edge itself lies closer.
+    """
+    wedges, cusps = given.wedges, given.geometry.cusps
+    nearest = np.empty((3, 2))
+    for index, cusp in enumerate(cusps):
+        places = np.linspace(0.0, cusp.suture_line.length, 2001)
+        distance = wedges.wedge(index, 1.0).signed_distance(cusp.suture_line.point(places))
+        nearest[index] = distance[:1001].min(), distance[1000:].min()
+    # cusp i hangs from A_(i+1) to A_(i+2), where cusp i+1 begins
+    return float(min(nearest[i, 1] + nearest[(i + 1) % 3, 0] for i in range(3)))
+
+
+def tolerances_of(given: ValveInput) -> Tolerances:
     """What a verified result of this scene must keep.
 
-    Mid-surfaces of different cusps keep the sum of their clearances, but no more than the
-    sutured edges themselves are apart; the wall its clearance beyond the taper.
+    Mid-surfaces of different cusps keep the sum of their clearances from the contact wedge, but
+    no more than their sutured edges keep from it or from each other (design.md §1); the wall its
+    clearance beyond the taper.
     """
+    scene, geometry = given.scene, given.geometry
     halves = sorted(cusp.thickness / 2 for cusp in geometry.cusps)
     wedge = (
         halves[0] + halves[1] if scene.contact.clearance is None else 2 * scene.contact.clearance
     )
     radius, gap = geometry.root.radius, scene.commissures.gap
-    edges_apart = 2 * radius * np.sin(gap / (2 * radius))
+    apart = min(_edges_apart(given), 2 * radius * np.sin(gap / (2 * radius)))
     return Tolerances(
         residual=scene.solver.tolerance,
         inside_mm=scene.inside_tolerance(2 * halves[0]),
         clamp_deg=scene.clamp.tolerance_degrees if scene.material.bending else np.inf,
-        cusp_distance_mm=min(wedge, float(edges_apart)),
+        cusp_distance_mm=max(min(wedge, float(apart)), 0.0),
         wall_distance_mm=max(
             halves[0] if scene.wall.clearance is None else scene.wall.clearance, 0.0
         ),

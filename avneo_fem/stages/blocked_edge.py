@@ -108,7 +108,8 @@ def blocked_row(
     tangent = along / np.linalg.norm(along, axis=1, keepdims=True)
     inward = np.einsum("kd,kd->k", conormal, tangent)[:, None] * tangent - conormal
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    foot = target[:-1] + np.clip(share, 0.0, 1.0)[:, None] * along
+    share = np.clip(share, 0.0, 1.0)
+    foot = target[:-1] + share[:, None] * along
     at_free_edge = np.isin(apex, mesh.free_edge)
     # the free edge keeps the height over its corner that the template gives it
     corner = np.where(np.arange(len(apex)) < len(apex) / 2, 0, len(apex))
@@ -124,6 +125,26 @@ def blocked_row(
     order = np.flatnonzero(blocked)[np.argsort(room[blocked], kind="stable")]
     nodes, first = np.unique(apex[order], return_index=True)
     edge = order[first]
+    share = _cleared_of_bends(share, tangent, np.linalg.norm(along, axis=1), room)
+    foot[~at_free_edge] = (target[:-1] + share[:, None] * along)[~at_free_edge]
     normal = np.cross(tangent[edge], -inward[edge])
     laid = np.isin(apex, nodes)
     return LaidRow(nodes, foot[edge], tangent[edge], inward[edge], normal, room[edge], laid)
+
+
+def _cleared_of_bends(share: Floats, tangent: Floats, length: Floats, room: Floats) -> Floats:
+    """Places (k-1,) along the suture edges that keep the row from cutting a corner.
+
+    Where the suture line bends by beta, a row laid at distance d would cut the corner between two
+    nodes that are both further than d / beta from it. So each node goes near to the end of its
+    edge that is away from the commissure.
+    """
+    count = len(share)
+    bend = np.zeros(count + 1)
+    cosine = np.einsum("kd,kd->k", tangent[:-1], tangent[1:])
+    bend[1:-1] = np.arccos(np.clip(cosine, -1.0, 1.0))
+    ahead = np.arange(count) < count / 2
+    corner = np.where(ahead, np.arange(count) + 1, np.arange(count))
+    allowed = room / (2.0 * np.maximum(bend[corner], 1e-9)) / length
+    from_end = np.minimum(np.where(ahead, 1.0 - share, share), allowed)
+    return np.where(ahead, 1.0 - from_end, from_end)

