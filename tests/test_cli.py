@@ -70,6 +70,12 @@ BAD: dict[str, tuple[str, str, str]] = {
         "template.free_edge_length = 39.0",
         "would do",
     ),
+    "method": ("[contact]\nmethod = 'planes'", "contact.method = 'planes'", '"virtual_planes"'),
+    "no symmetry": (
+        (DEMOS / "experiment_2.toml").read_text() + "[contact]\nmethod = 'symmetry_planes'\n",
+        "contact.method = 'symmetry_planes'",
+        "not symmetric: its chords (20.9068, ",
+    ),
     "not TOML": ("[template\nthickness = 0.5", "scene file = ", "is not valid TOML"),
     "policy": (
         (DEMOS / "experiment_2.toml").read_text() + '\n[competence]\npolicy = "error"\n',
@@ -213,6 +219,16 @@ def test_check(number: int) -> None:
     assert ("not competent: " in process.stderr) == (number == 2)
     assert avneo_inside("check", scene).stdout == ""
     assert avneo_inside("check", scene).stderr == process.stderr
+
+
+def test_check_of_contact_planes(tmp_path: Path) -> None:
+    """Truth: planes have no sigma*: null in the report, no row in the table."""
+    scene = written("[contact]\nmethod = 'virtual_planes'", tmp_path)
+    process = avneo_inside("check", scene, "--json")
+    assert process.returncode == 0
+    assert json.loads(process.stdout)["sigma"] is None
+    assert "sigma" not in process.stderr
+    assert "stitching ratio J_sl" in process.stderr
 
 
 def test_check_takes_the_fidelity(tmp_path: Path) -> None:

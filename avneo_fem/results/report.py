@@ -40,7 +40,8 @@ def geometry_report(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> dict
         "asl_length": [float(cusp.suture_line.length) for cusp in cusps],
         "csl_length": [float(cusp.template.suture_length) for cusp in cusps],
         "stitching_ratio": [float(cusp.stitching.stitching_ratio) for cusp in cusps],
-        "sigma": wedges.sigma.tolist(),
+        "contact_method": wedges.method,
+        "sigma": None if wedges.sigma is None else wedges.sigma.tolist(),
     }
 
 
