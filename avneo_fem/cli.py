@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from avneo_fem.cli_tables import show_geometry
+from avneo_fem.cli_tables import show_geometry, show_sizes
 from avneo_fem.errors import AvneoError, SceneError
 from avneo_fem.scene import FIDELITIES, load_scene
 
@@ -44,6 +44,20 @@ def check(scene: Scene, fidelity: Fidelity = None, json: Json = False) -> None:
     show_geometry(_people, geometry)
     if json:
         sys.stdout.write(to_json(geometry))
+
+
+@app.command()
+def size(scene: Scene, json: Json = False) -> None:
+    """Quasi-optimal free-edge lengths (Prop. 3.2) for the commissures of a scene."""
+    from avneo_fem.geometry.resizing import resize
+    from avneo_fem.results.report import sizing_report, to_json
+
+    sizes = sizing_report(resize(load_scene(scene)))
+    show_sizes(_people, sizes)
+    if json:
+        sys.stdout.write(to_json(sizes))
+    if not sizes["verified"]:
+        raise typer.Exit(1)
 
 
 def _observer(rank: int) -> Any:

@@ -9,7 +9,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-__all__ = ["show_geometry"]
+from avneo_fem.geometry.competence import range_text
+
+__all__ = ["show_geometry", "show_sizes"]
 
 
 def _cusp_table(title: str) -> Table:
@@ -37,7 +39,16 @@ def _geometry_table(geometry: dict[str, Any]) -> Table:
     ):
         if geometry[key] is not None:  # contact planes have no sigma
             _add_row(table, label, geometry[key], digits)
+    advice = geometry["free_edge_advice"]
+    if advice["for_unit_nu"] is not None:
+        _add_row(table, "all L_f times nu* [mm]", advice["for_unit_nu"], 3)
+        table.add_row(escape("closing L_f, all [mm]"), *_ranges(advice["together"]))
+    table.add_row(escape("closing L_f, alone [mm]"), *_ranges(advice["alone"]))
     return table
+
+
+def _ranges(pairs: Sequence[Any]) -> list[str]:
+    return [range_text(pair, 4, "-") for pair in pairs]
 
 
 def show_geometry(console: Console, geometry: dict[str, Any]) -> None:
@@ -48,3 +59,31 @@ def show_geometry(console: Console, geometry: dict[str, Any]) -> None:
     console.print(f"triple contact point ({point}) mm, {case}; nu* = {nu:.4f}")
     verdict = "[green]competent[/]" if geometry["competent"] else "[yellow]not competent[/]"
     console.print(f"{verdict}: {escape(geometry['competence_reason'])}")
+
+
+def show_sizes(console: Console, sizes: dict[str, Any]) -> None:
+    """Print present and quasi-optimal sizes (those of the report) and the verdict on them."""
+    present, wanted = sizes["present"], sizes["quasi_optimal"]
+    table = _cusp_table("sizes")
+    for label, values, digits in (
+        ("chord a_i [mm]", sizes["chord_lengths"], 3),
+        ("free edge L_f now [mm]", present["free_edge_length"], 3),
+        ("quasi-optimal L_f = 2 a_i / sqrt(3) [mm]", wanted["free_edge_length"], 3),
+    ):
+        _add_row(table, label, values, digits)
+    table.add_row(escape("change [mm]"), *(f"{change:+.3f}" for change in wanted["change"]))
+    for label, values, digits in (
+        ("shortest in proportion, nu* = 1 [mm]", sizes["free_edge_length_for_nu_1"], 3),
+        ("belly radius R_s now [mm]", present["belly_radius"], 3),
+        ("R_s in proportion to L_f [mm]", wanted["belly_radius"], 3),
+        ("stitching ratio J_sl with these", wanted["stitching_ratio"], 4),
+    ):
+        _add_row(table, label, values, digits)
+    console.print(table)
+    if present["problem"] is None:
+        console.print(f"now: nu* = {present['nu_star']:.4f}")
+    else:
+        console.print(f"now: no valve, {escape(present['problem'])}")
+    console.print(f"rebuilt with the quasi-optimal sizes: nu* = {wanted['nu_star']:.4f}")
+    verdict = "[green]verified[/]" if sizes["verified"] else "[red]not verified[/]"
+    console.print(f"{verdict}: {escape(wanted['competence_reason'])}")

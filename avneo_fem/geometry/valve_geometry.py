@@ -14,7 +14,7 @@ from avneo_fem.geometry.commissure import (
     contact_lengths,
 )
 from avneo_fem.geometry.commissure_plane import CommissurePlane
-from avneo_fem.geometry.competence import competence_verdict
+from avneo_fem.geometry.competence import Verdict, competence_verdict
 from avneo_fem.geometry.root import CylinderRoot
 from avneo_fem.geometry.stitching import StitchingMap
 from avneo_fem.geometry.suture_line import AorticSutureLine
@@ -22,7 +22,7 @@ from avneo_fem.geometry.template import CuspTemplate, free_edge_length_for
 from avneo_fem.geometry.triple_contact import TripleContactPoint, triple_contact_point
 from avneo_fem.scene import Scene
 
-__all__ = ["CuspGeometry", "ValveGeometry"]
+__all__ = ["CuspGeometry", "ValveGeometry", "commissure_plane"]
 
 Array = NDArray[np.float64]
 
@@ -68,9 +68,8 @@ class ValveGeometry:
     commissure_lengths, contact_lengths : (3,) float64
         l_i and c_i [mm] (paper section 3.3).
     triple_contact : TripleContactPoint
-    competent : bool
-    competence_reason : str
-        Why, or why not and what would help (paper section 3.4, step 1).
+    verdict : Verdict
+        Whether it can close, why or why not, and what would help (paper section 3.4, step 1).
     """
 
     root: CylinderRoot
@@ -79,8 +78,17 @@ class ValveGeometry:
     commissure_lengths: Array
     contact_lengths: Array
     triple_contact: TripleContactPoint
-    competent: bool
-    competence_reason: str
+    verdict: Verdict
+
+    @property
+    def competent(self) -> bool:
+        """Whether the cusps can close the valve."""
+        return self.verdict.competent
+
+    @property
+    def competence_reason(self) -> str:
+        """Why, or why not and what would help, in one line."""
+        return self.verdict.reason
 
     @classmethod
     def from_scene(cls, scene: Scene) -> ValveGeometry:
@@ -109,24 +117,36 @@ class ValveGeometry:
             )
             for i in range(3)
         ]
-        plane = CommissurePlane(
-            np.array([(lines[(i + 1) % 3].ends[1] + lines[(i + 2) % 3].ends[0]) for i in range(3)])
-            / 2.0
-        )
+        plane = _plane(lines)
         lengths = np.array([template.intercommissural_length for template in templates])
         contact = contact_lengths(lengths)
         triple = triple_contact_point(plane.points, contact)
-        competent, reason = competence_verdict(triple, plane, contact, scene.competence)
-        if not competent and scene.competence.policy == "error":
+        verdict = competence_verdict(triple, plane, lengths, contact, scene.competence)
+        if not verdict.competent and scene.competence.policy == "error":
             raise SceneError(
-                "competence.policy", "error", f'{reason}; "warn" would go on all the same'
+                "competence.policy", "error", f'{verdict.reason}; "warn" would go on all the same'
             )
         for array in (lengths, contact, triple.point):
             array.flags.writeable = False
         root = CylinderRoot(scene.root.radius)
-        return cls(
-            root, plane, (cusps[0], cusps[1], cusps[2]), lengths, contact, triple, competent, reason
-        )
+        return cls(root, plane, (cusps[0], cusps[1], cusps[2]), lengths, contact, triple, verdict)
+
+
+def commissure_plane(scene: Scene) -> CommissurePlane:
+    """Commissures of a scene, whatever its templates are.
+
+    Raises
+    ------
+    SceneError
+        For chords that form no triangle, or a gap that leaves no suture line.
+    """
+    return _plane(_suture_lines(scene))
+
+
+def _plane(lines: list[AorticSutureLine]) -> CommissurePlane:
+    """A_i: midpoints between the ends of neighbouring suture lines (paper section 3.1)."""
+    sums = [lines[(i + 1) % 3].ends[1] + lines[(i + 2) % 3].ends[0] for i in range(3)]
+    return CommissurePlane(np.array(sums) / 2.0)
 
 
 def _suture_lines(scene: Scene) -> list[AorticSutureLine]:
