@@ -120,4 +120,6 @@ def test_range_text() -> None:
     assert range_text((22.853001, 47.98899)) == "22.854 to 47.988"
     assert range_text((22.853001, 47.98899), 4, "-") == "22.86-47.98"
     assert range_text((0.0228531, 0.0479899)) == "0.022854 to 0.047989"
+    assert range_text((12344.1, 23400.0)) == "12345 to 23400"
+    assert range_text((21.03, 48.2), 4) == "21.03 to 48.20"
     assert range_text((22.8531, 22.8532)) == "22.853100000000001 to 22.853200000000001"

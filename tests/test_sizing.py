@@ -129,22 +129,25 @@ def test_advice_for_one_cusp(ratio: tuple[float, ...], lengths: tuple[float, ...
     plane, present = plane_of(ratio), np.array(lengths)
     is_now = competent(plane, present[None], LIMITS)[0]
 
-    def closes(i: int, value: float) -> bool:
-        sizes = present.copy()
-        sizes[i] = value
-        return bool(competent(plane, sizes[None], LIMITS)[0])
+    def closes(i: int, values: list[float] | np.ndarray) -> np.ndarray:
+        sizes = np.tile(present, (len(values), 1))
+        sizes[:, i] = values
+        return competent(plane, sizes, LIMITS)
 
     for i, found in enumerate(length_advice(plane, present, LIMITS).alone):
         j, k = (i + 1) % 3, (i + 2) % 3
-        scan = np.linspace(abs(present[j] - present[k]), present[j] + present[k], 3337)
-        good = [value for value in scan if closes(i, value)]
+        scan = np.linspace(abs(present[j] - present[k]), present[j] + present[k], 33337)
+        good = scan[closes(i, scan)]
         if found is None:
-            assert not good
+            assert good.size == 0
             continue
         low, high = found
-        for end, beyond in ((low, -1e-6), (high, 1e-6)):
-            assert closes(i, end)
-            assert not closes(i, end + beyond)
+        assert closes(i, [low, high, low - 1e-6, high + 1e-6]).tolist() == [
+            True,
+            True,
+            False,
+            False,
+        ]
         assert (low <= present[i] <= high) == is_now
-        near = min(good, key=lambda value: abs(value - present[i]))
-        assert low - 0.05 <= near <= high + 0.05
+        near = good[np.argmin(np.abs(good - present[i]))]
+        assert low - 0.005 <= near <= high + 0.005

@@ -42,7 +42,7 @@ def range_text(limits: tuple[float, float] | None, digits: int = 5, joint: str =
     inner = ceil(low / unit) * unit, floor(high / unit) * unit
     if inner[0] > inner[1]:
         return f"{low:.17g}{joint}{high:.17g}"
-    return f"{inner[0]:.{digits}g}{joint}{inner[1]:.{digits}g}"
+    return joint.join(f"{end:#.{digits}g}".rstrip(".") for end in inner)
 
 
 def competence_verdict(
