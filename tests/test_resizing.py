@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.resizing import Resizing, resize, resized_scene
 from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.scene import load_scene, parse_scene
 from test_sizing import dilation
+from test_valve_input import scenes
 from valve_cases import DEMOS, SCENES
 
 
@@ -125,3 +127,24 @@ def test_errors(tables: dict[str, Any], words: str) -> None:
     with pytest.raises(SceneError, match=words) as caught:
         sizes_of(tables)
     assert "\n" not in str(caught.value)
+
+
+@settings(max_examples=60, deadline=None)
+@given(scenes())
+def test_anything_is_either_sized_or_a_scene_error(data: dict[str, Any]) -> None:
+    """Truth: Proposition 3.2 for every root that the schema allows: nu* <= 1 inside the triangle,
+    whatever the present cusps are; else one line says why not."""
+    found: Resizing | SceneError
+    try:
+        found = sizes_of(data)
+    except SceneError as error:
+        found = error
+    if isinstance(found, SceneError):
+        assert "\n" not in str(found)
+        return
+    triple = found.rebuilt.triple_contact
+    assert triple.case == "interior"
+    assert np.sqrt(3.0) / 2.0 - 1e-9 <= triple.nu_star <= 1.0 + 1e-9
+    assert found.verified
+    assert (found.present_nu is None) == (found.present_problem is not None)
+    assert np.all(found.closing <= found.quasi_optimal * (1.0 + 1e-9))
