@@ -13,8 +13,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
+from avneo_fem.cli_tables import show_geometry, show_sizes
 from avneo_fem.errors import AvneoError, SceneError
 from avneo_fem.scene import FIDELITIES, load_scene
 
@@ -33,33 +33,6 @@ Fidelity = Annotated[str | None, typer.Option(help=f"one of {', '.join(FIDELITIE
 Json = Annotated[bool, typer.Option("--json", help="print the report on stdout")]
 
 
-def _table(geometry: dict[str, Any]) -> Table:
-    """Geometry of the three cusps as a table for people."""
-    table = Table(title="geometry", title_justify="left")
-    for head in ("", "cusp 0", "cusp 1", "cusp 2"):
-        table.add_column(head, justify="left" if not head else "right")
-    for label, key, digits in (
-        ("chord a_i [mm]", "chord_lengths", 3),
-        ("length l_i [mm]", "commissure_lengths", 3),
-        ("contact c_i [mm]", "contact_lengths", 3),
-        ("aortic suture line l_a [mm]", "asl_length", 3),
-        ("cusp suture line l_c [mm]", "csl_length", 3),
-        ("stitching ratio J_sl", "stitching_ratio", 4),
-        ("sigma*", "sigma", 4),
-    ):
-        table.add_row(escape(label), *(f"{value:.{digits}f}" for value in geometry[key]))
-    return table
-
-
-def _show_geometry(geometry: dict[str, Any]) -> None:
-    _people.print(_table(geometry))
-    point = ", ".join(f"{x:.4f}" for x in geometry["triple_contact_point"])
-    case, nu = geometry["triple_point_case"], geometry["nu_star"]
-    _people.print(f"triple contact point ({point}) mm, {case}; nu* = {nu:.4f}")
-    verdict = "[green]competent[/]" if geometry["competent"] else "[yellow]not competent[/]"
-    _people.print(f"{verdict}: {escape(geometry['competence_reason'])}")
-
-
 @app.command()
 def check(scene: Scene, fidelity: Fidelity = None, json: Json = False) -> None:
     """Geometry and competence of a scene, without solving anything."""
@@ -68,9 +41,23 @@ def check(scene: Scene, fidelity: Fidelity = None, json: Json = False) -> None:
 
     given = ValveInput.from_scene(load_scene(scene, fidelity))
     geometry = geometry_report(given.geometry, given.wedges)
-    _show_geometry(geometry)
+    show_geometry(_people, geometry)
     if json:
         sys.stdout.write(to_json(geometry))
+
+
+@app.command()
+def size(scene: Scene, json: Json = False) -> None:
+    """Quasi-optimal free-edge lengths (Prop. 3.2) for the commissures of a scene."""
+    from avneo_fem.geometry.resizing import resize
+    from avneo_fem.results.report import sizing_report, to_json
+
+    sizes = sizing_report(resize(load_scene(scene)))
+    show_sizes(_people, sizes)
+    if json:
+        sys.stdout.write(to_json(sizes))
+    if not sizes["verified"]:
+        raise typer.Exit(1)
 
 
 def _observer(rank: int) -> Any:

@@ -15,6 +15,7 @@ from avneo_fem.scene_tables import Finite, NonNegative, Positive, Table
 __all__ = [
     "Clamp",
     "Contact",
+    "ContactMethod",
     "FreeEdge",
     "Material",
     "Mesh",
@@ -22,6 +23,10 @@ __all__ = [
     "Solver",
     "Wall",
 ]
+
+
+#: Contact surfaces of the cusps: the paper's, those of its [5] and those of its [13, 14].
+ContactMethod = Literal["bezier", "virtual_planes", "symmetry_planes"]
 
 
 class Material(Table):
@@ -45,6 +50,12 @@ class FreeEdge(Table):
 class Contact(Table):
     """Contact wedge between the cusps (paper §3.3.2, (1.5))."""
 
+    method: ContactMethod = Field(
+        "bezier",
+        description="contact surfaces: the paper's curved ones, reached by lambda steps;"
+        " half-planes through triple contact point and commissures (its [5]); the symmetry planes"
+        " of equal cusps (its [13, 14]). Planes are there at once, without omega and steps",
+    )
     stiffness: Positive = Field(16.0, description="eta_1 at the start [kPa]")
     width: Positive = Field(0.1, description="eta_2 [mm]")
     clearance: NonNegative | None = Field(

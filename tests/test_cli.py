@@ -70,6 +70,12 @@ BAD: dict[str, tuple[str, str, str]] = {
         "template.free_edge_length = 39.0",
         "would do",
     ),
+    "method": ("[contact]\nmethod = 'planes'", "contact.method = 'planes'", '"virtual_planes"'),
+    "no symmetry": (
+        (DEMOS / "experiment_2.toml").read_text() + "[contact]\nmethod = 'symmetry_planes'\n",
+        "contact.method = 'symmetry_planes'",
+        "not symmetric: its chords (20.9068, ",
+    ),
     "not TOML": ("[template\nthickness = 0.5", "scene file = ", "is not valid TOML"),
     "policy": (
         (DEMOS / "experiment_2.toml").read_text() + '\n[competence]\npolicy = "error"\n',
@@ -215,6 +221,75 @@ def test_check(number: int) -> None:
     assert avneo_inside("check", scene).stderr == process.stderr
 
 
+def test_check_of_contact_planes(tmp_path: Path) -> None:
+    """Truth: planes have no sigma*: null in the report, no row in the table."""
+    scene = written("[contact]\nmethod = 'virtual_planes'", tmp_path)
+    process = avneo_inside("check", scene, "--json")
+    assert process.returncode == 0
+    assert json.loads(process.stdout)["sigma"] is None
+    assert "sigma" not in process.stderr
+    assert "stitching ratio J_sl" in process.stderr
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_check_explains(number: int) -> None:
+    """Truth: people read which lengths would do, those of the report; a valve in case 1 has none in
+    proportion."""
+    process = avneo_inside("check", DEMOS / f"experiment_{number}.toml", "--json")
+    advice = json.loads(process.stdout)["free_edge_advice"]
+    assert ("all L_f times nu*" in process.stderr) == (number != 2)
+    assert "closing L_f, alone [mm]" in process.stderr
+    if number == 2:
+        assert advice["for_unit_nu"] is None
+        assert advice["alone"][1] is None
+        assert "31.51-40.49" in process.stderr
+        assert "none" in process.stderr
+    else:
+        assert f"{advice['for_unit_nu'][1]:.3f}" in process.stderr
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_size(number: int) -> None:
+    """Truth: status 0, L_f = 2 a / sqrt(3) and nu* of the rebuilt valve for people and as JSON."""
+    scene = DEMOS / f"experiment_{number}.toml"
+    process = avneo_inside("size", scene, "--json")
+    assert process.returncode == 0, process.stderr
+    report = json.loads(process.stdout)
+    wanted = report["quasi_optimal"]
+    expected = np.array(report["chord_lengths"]) * 2 / np.sqrt(3)
+    np.testing.assert_allclose(wanted["free_edge_length"], expected)
+    present = {1: [39.0] * 3, 2: [58.5, 39.0, 48.75], 3: [27.48948749, 18.32632499, 22.90790624]}
+    np.testing.assert_allclose(report["present"]["free_edge_length"], present[number])
+    np.testing.assert_allclose(wanted["change"], expected - present[number], atol=1e-7)
+    assert report["verified"] is True
+    assert f"nu* = {wanted['nu_star']:.4f}" in process.stderr
+    assert "verified: " in process.stderr
+    for length in wanted["free_edge_length"]:
+        assert f"{length:.3f}" in process.stderr
+    assert avneo_inside("size", scene).stdout == ""
+
+
+def test_size_that_is_not_competent(tmp_path: Path) -> None:
+    """Truth: status 1 when the limits of the scene leave no room for Proposition 3.2."""
+    text = "[commissures]\nchord_ratio = [6.0, 4.0, 5.0]\n[competence]\nminimum_nu = 0.99"
+    process = avneo_inside("size", written(text, tmp_path), "--json")
+    assert process.returncode == 1
+    assert json.loads(process.stdout)["verified"] is False
+    assert "not verified: nu* = 0.9859 < 0.99" in process.stderr
+
+
+def test_size_of_impossible_cusps(tmp_path: Path) -> None:
+    """Truth: inconsistent present lengths are told, not fatal; status 2 in one line where the
+    quasi-optimal cusp would not fit its suture line, or for a bad scene."""
+    text = "[[cusp]]\ntemplate.free_edge_length = 90.0\n[[cusp]]\n[[cusp]]"
+    process = avneo_inside("size", written(text, tmp_path))
+    assert process.returncode == 0
+    assert "now: no valve, cusp.0.template.free_edge_length = 90.0" in process.stderr
+    scene = written("[template]\ncorner_height = 2.0", tmp_path)
+    one_line(avneo_inside("size", scene), "free_edge_length = 23.9", "change corner_height")
+    one_line(avneo_inside("size", written("[rot]", tmp_path)), "rot = {}", "'root'")
+
+
 def test_check_takes_the_fidelity(tmp_path: Path) -> None:
     """Truth: ``--fidelity`` is accepted by every scene; it does not change the geometry."""
     scene = written(SMALL, tmp_path)
@@ -237,6 +312,7 @@ def test_check_needs_no_solver() -> None:
     )
     for arguments, status in (
         (["check", str(DEMOS / "experiment_1.toml")], 0),
+        (["size", str(DEMOS / "experiment_1.toml")], 0),
         (["suture", "missing.toml"], 2),
     ):
         process = subprocess.run(
@@ -256,7 +332,7 @@ def test_entry_points() -> None:
     assert entry.load().__module__ == "avneo_fem.cli"
     text = avneo("--help")
     assert text.returncode == 0
-    for command in ("check", "suture", "plot"):
+    for command in ("check", "size", "suture", "plot"):
         assert f" {command} " in text.stdout
     for option in ("--output", "--fidelity", "--cusp", "--resume", "--json"):
         assert option in avneo_inside("suture", "--help").stdout

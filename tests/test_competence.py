@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from avneo_fem.errors import SceneError
+from avneo_fem.geometry.competence import range_text
 from valve_cases import SCENES, build, experiment, quasi_optimal
 
 
@@ -58,3 +59,67 @@ def test_policy_error() -> None:
         build({**SCENES[2], "competence": {"policy": "error"}})
     assert caught.value.key == "competence.policy"
     assert build({"competence": {"policy": "error"}}).competent
+
+
+def test_policy_error_is_one_readable_line() -> None:
+    """Truth: the reason, the cusp at fault and lengths that would do, and the way out."""
+    with pytest.raises(SceneError) as caught:
+        build({**SCENES[2], "competence": {"policy": "error"}})
+    text = str(caught.value)
+    assert len(text) < 600
+    for words in (
+        "cusp 1 is too small for cusps 0 and 2",
+        "no common factor helps",
+        '"warn" would',
+    ):
+        assert words in text
+
+
+def test_advice_for_one_cusp_works() -> None:
+    """Truth: either end of each range advised for Experiment 2 makes its valve competent; half a
+    millimetre beyond does not."""
+    reason = experiment(2, "code").competence_reason.split("changed alone, ")[1]
+    for index, radius in ((0, 13.0), (2, 11.0)):
+        words = reason.split(f"cusp {index} of ")[1].split(" mm")[0]
+        low, high = (float(x) for x in words.split(" to "))
+        for length, good in ((low, True), (high, True), (low - 0.5, False), (high + 0.5, False)):
+            cusps = [{"template": dict(cusp["template"])} for cusp in SCENES[2]["cusp"]]
+            cusps[index]["template"] = {"free_edge_length": length, "belly_radius": radius}
+            assert build({**SCENES[2], "cusp": cusps}).competent is good
+    assert "cusp 1" not in reason  # no length of cusp 1 alone would do
+
+
+def test_the_cusp_at_fault_is_named() -> None:
+    """Truth: of Experiment 3's cusps, cusp 1 shortened by a tenth is the shortest for its chord of
+    15.871 mm; equal cusps on equal chords have none at fault."""
+    data = quasi_optimal(0.95)
+    data["cusp"][1]["template"]["free_edge_length"] *= 0.9
+    data["competence"] = {"maximum_nu": 1.0}
+    length = data["cusp"][1]["template"]["free_edge_length"]
+    reason = build(data).competence_reason
+    assert (
+        "too small to close, shortest for its chord is cusp 1 with free_edge_length ="
+        f" {length:.4g} mm = {length / 15.8711:.4g} a_1"
+    ) in reason
+    alike = build({"competence": {"minimum_nu": 0.7}}).competence_reason
+    assert (
+        "too large; all free_edge_length times 0.6153 give nu* = 1 (23.99, 23.99, 23.99 mm)"
+        in alike
+    )
+
+
+def test_a_common_factor_that_would_do() -> None:
+    """Truth: nu*/nu_max and nu*/nu_min for Experiment 1, nu* = 12 cos(1/48) / 19.5 = 0.615251."""
+    reason = build({"competence": {"minimum_nu": 0.7}}).competence_reason
+    assert "times 0.58596 to 0.87893 would do" in reason
+
+
+def test_range_text() -> None:
+    """Truth: rounded inwards, so that both ends written are within; in full where too narrow."""
+    assert range_text(None) == "none"
+    assert range_text((22.853001, 47.98899)) == "22.854 to 47.988"
+    assert range_text((22.853001, 47.98899), 4, "-") == "22.86-47.98"
+    assert range_text((0.0228531, 0.0479899)) == "0.022854 to 0.047989"
+    assert range_text((12344.1, 23400.0)) == "12345 to 23400"
+    assert range_text((21.03, 48.2), 4) == "21.03 to 48.20"
+    assert range_text((22.8531, 22.8532)) == "22.853100000000001 to 22.853200000000001"

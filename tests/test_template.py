@@ -12,7 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avneo_fem.errors import SceneError
-from avneo_fem.geometry.template import CuspTemplate, free_edge_length_for, suture_length
+from avneo_fem.geometry.template import (
+    CuspTemplate,
+    corner_height_for,
+    free_edge_length_for,
+    suture_length,
+)
 from avneo_fem.scene import Template
 
 
@@ -172,3 +177,19 @@ def test_free_edge_length_for(parameters: Template, factor: float) -> None:
     changed = parameters.model_copy(update={"free_edge_length": found})
     assert CuspTemplate(changed).suture_length == pytest.approx(factor * shortest, rel=1e-10)
     assert free_edge_length_for(shortest / factor, parameters) is None
+
+
+@settings(deadline=None)
+@given(templates(), st.floats(0.05, 3.0))
+def test_corner_height_for(parameters: Template, factor: float) -> None:
+    """Truth: l_c grows with H_i, so the H_i that gives the CSL of another one is that other one; a
+    shorter CSL than that of the lowest corners there is none."""
+    half, radius = parameters.free_edge_length / 2.0, parameters.belly_radius
+    lowest = sqrt(max(radius**2 - half**2, 0.0))
+    height = lowest + factor * (half + radius)
+    other = parameters.model_copy(update={"corner_height": height})
+    found = corner_height_for(suture_length(other), parameters)
+    assert found == pytest.approx(height, rel=1e-9)
+    taller = other.model_copy(update={"corner_height": 1.01 * height})
+    assert suture_length(taller) > suture_length(other)
+    assert corner_height_for(0.99 * parameters.free_edge_length, parameters) is None

@@ -164,6 +164,36 @@ def test_stitching_without_a_free_edge_that_would_do() -> None:
     assert np.pi * 16.5 + 23.0 > limit
 
 
+@pytest.mark.parametrize(
+    ("tables", "low_is_sharp"),
+    [
+        ({"template": {"free_edge_length": 20.78, "belly_radius": 8.79, "corner_height": 5}}, True),
+        (
+            {"template": {"free_edge_length": 39.5, "belly_radius": 16.7, "corner_height": 40}},
+            False,
+        ),
+    ],
+)
+def test_corner_height_advice_works(tables: dict[str, Any], low_is_sharp: bool) -> None:
+    """Truth: corner heights just inside the offered range can be stitched, outside not."""
+    with pytest.raises(SceneError) as caught:
+        build(tables)
+    words = caught.value.valid.rsplit("; or corner_height ", 1)[1].split()
+    high = float(words[-2])
+    good, bad = [high * 0.999], [high * 1.001]
+    if low_is_sharp:
+        assert words[0] == "between"
+        good.append(float(words[1]) * 1.001)
+        bad.append(float(words[1]) * 0.999)
+    else:
+        assert words[0] == "below"
+    for height in good:
+        build({"template": {**tables["template"], "corner_height": height}})
+    for height in bad:
+        with pytest.raises(SceneError, match="J_sl"):
+            build({"template": {**tables["template"], "corner_height": height}})
+
+
 def test_gap_limit_is_sharp() -> None:
     """Truth: the gap may take up all but the whole arc of the smallest cusp, 2 R alpha_min."""
     with pytest.raises(SceneError, match="cusp 1") as caught:

@@ -27,7 +27,7 @@ class ContactWedge:
         Plane coordinates: origin in the circumcentre of the commissures, first axis towards A_0.
     cusp_index : int
     lam : float
-        lambda of (3.5), 0 to 1.
+        lambda of (3.5), 0 to 1; 1 for contact planes, which have no path.
     """
 
     section: PlanarWedge

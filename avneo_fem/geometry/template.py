@@ -11,6 +11,7 @@ simple: along every piece of it the polar angle about the origin grows monotonic
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import acos, atan, hypot, pi, sqrt
 
 import numpy as np
@@ -21,7 +22,7 @@ from avneo_fem.errors import SceneError
 from avneo_fem.geometry.curve import PlanarPath
 from avneo_fem.geometry.segments import Arc, Line
 
-__all__ = ["CuspTemplate", "free_edge_length_for", "suture_length"]
+__all__ = ["CuspTemplate", "corner_height_for", "free_edge_length_for", "suture_length"]
 
 
 def _angles(parameters: scene.Template) -> tuple[float, float, float]:
@@ -64,13 +65,44 @@ def free_edge_length_for(length: float, parameters: scene.Template) -> float | N
         return suture_length(changed) > length
 
     # l_c >= |N_0 N_1| = L_f bounds the wanted value from above
-    low, high = parameters.belly_radius, length / 2.0
+    half = _largest(too_long, parameters.belly_radius, length / 2.0)
+    return None if half is None else 2.0 * half
+
+
+def corner_height_for(length: float, parameters: scene.Template) -> float | None:
+    """Corner height H_i [mm] that gives the CSL a wanted length, all else kept.
+
+    Parameters
+    ----------
+    length : float
+        Wanted length l_c of the CSL [mm], which grows with H_i.
+    parameters : scene.Template
+        Its ``corner_height`` is ignored.
+
+    Returns
+    -------
+    float or None
+        H_i; None when the CSL is longer than wanted even for the lowest corners, where they touch
+        the belly arc or H_i = 0.
+    """
+
+    def too_long(height: float) -> bool:
+        return suture_length(parameters.model_copy(update={"corner_height": height})) > length
+
+    half, radius = parameters.free_edge_length / 2.0, parameters.belly_radius
+    lowest = sqrt((radius - half) * (radius + half)) if radius > half else 0.0
+    # a hair above, where the template exists; l_c >= 2 H_i bounds the wanted value from above
+    return _largest(too_long, lowest + 1e-9 * (radius + half), length / 2.0)
+
+
+def _largest(too_long: Callable[[float], bool], low: float, high: float) -> float | None:
+    """The largest value that is not too long, by halving; None if ``low`` already is."""
     if too_long(low):
         return None
     for _ in range(60):
         middle = (low + high) / 2.0
         low, high = (low, middle) if too_long(middle) else (middle, high)
-    return low + high
+    return (low + high) / 2.0
 
 
 class CuspTemplate:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.symmetry import require_symmetry
 from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.scene import Scene
 
@@ -21,7 +22,7 @@ class ValveInput:
     geometry : ValveGeometry
         Templates, suture lines, commissures and triple contact point.
     wedges : ContactWedgeFamily
-        The contact wedges of the three cusps, lambda = 0 ... 1.
+        The contact wedges of the three cusps by ``contact.method``, lambda = 0 ... 1.
     """
 
     scene: Scene
@@ -36,18 +37,21 @@ class ValveInput:
         ------
         SceneError
             When the scene is geometrically impossible, which includes a contact wedge whose two
-            curves cross at one of the run's lambda.
+            curves cross at one of the run's lambda, and symmetry planes of a valve without
+            symmetry.
         """
         geometry = ValveGeometry.from_scene(scene)
+        require_symmetry(scene, geometry.commissures)
         wedges = ContactWedgeFamily(
             geometry.commissures,
             geometry.triple_contact.point,
             geometry.contact_lengths,
             scene.contact.omega,
+            scene.contact.method,
         )
         for index in range(3):
-            for step in range(scene.contact.steps + 1):
-                wedges.wedge(index, step / scene.contact.steps)
+            for lam in wedges.levels(scene.contact.steps):
+                wedges.wedge(index, lam)
         return cls(scene, geometry, wedges)
 
     def seen_from(self, index: int) -> ValveInput:

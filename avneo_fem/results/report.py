@@ -13,13 +13,14 @@ import numpy as np
 
 from avneo_fem import __version__
 from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.resizing import Resizing
 from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.results.verdict import ValveVerification
 from avneo_fem.results.writing import written_whole
 from avneo_fem.scene import Scene
 from avneo_fem.stages.record import CuspResult
 
-__all__ = ["build_report", "geometry_report", "to_json", "write_report"]
+__all__ = ["build_report", "geometry_report", "sizing_report", "to_json", "write_report"]
 
 
 def geometry_report(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> dict[str, Any]:
@@ -37,10 +38,37 @@ def geometry_report(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> dict
         "triple_point_case": triple.case,
         "competent": geometry.competent,
         "competence_reason": geometry.competence_reason,
+        "free_edge_advice": asdict(geometry.verdict.advice),
         "asl_length": [float(cusp.suture_line.length) for cusp in cusps],
         "csl_length": [float(cusp.template.suture_length) for cusp in cusps],
         "stitching_ratio": [float(cusp.stitching.stitching_ratio) for cusp in cusps],
-        "sigma": wedges.sigma.tolist(),
+        "contact_method": wedges.method,
+        "sigma": None if wedges.sigma is None else wedges.sigma.tolist(),
+    }
+
+
+def sizing_report(sizes: Resizing) -> dict[str, Any]:
+    """What ``avneo size`` prints: lengths in mm, per cusp."""
+    rebuilt = sizes.rebuilt
+    return {
+        "chord_lengths": sizes.chord_lengths.tolist(),
+        "present": {
+            "free_edge_length": sizes.present.tolist(),
+            "belly_radius": sizes.present_radii.tolist(),
+            "nu_star": sizes.present_nu,
+            "problem": sizes.present_problem,
+        },
+        "quasi_optimal": {
+            "free_edge_length": sizes.quasi_optimal.tolist(),
+            "change": (sizes.quasi_optimal - sizes.present).tolist(),
+            "belly_radius": sizes.radii.tolist(),
+            "stitching_ratio": [float(cusp.stitching.stitching_ratio) for cusp in rebuilt.cusps],
+            "nu_star": float(rebuilt.triple_contact.nu_star),
+            "competent": rebuilt.competent,
+            "competence_reason": rebuilt.competence_reason,
+        },
+        "free_edge_length_for_nu_1": sizes.closing.tolist(),
+        "verified": sizes.verified,
     }
 
 
