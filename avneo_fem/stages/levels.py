@@ -38,7 +38,9 @@ def _steps(name: str, count: int, mesh: int = 0) -> list[Level]:
     return [Level(name, k / count, (k + 1) / count, mesh) for k in range(count)]
 
 
-def levels_of(scene: Scene, placement: int, finer: Sequence[CuspMesh] = ()) -> list[Level]:
+def levels_of(
+    scene: Scene, placement: int, lambdas: Sequence[float], finer: Sequence[CuspMesh] = ()
+) -> list[Level]:
     """All levels up to the last mesh; the raising of penalties afterwards has as many as it needs.
 
     Parameters
@@ -46,6 +48,8 @@ def levels_of(scene: Scene, placement: int, finer: Sequence[CuspMesh] = ()) -> l
     scene : Scene
     placement : int
         k of the paper's search for the first position.
+    lambdas : sequence of float
+        How the contact wedge closes, from the level at which it appears (0) to 1.
     finer : sequence of CuspMesh
         Refinements of the first mesh.
     """
@@ -54,9 +58,9 @@ def levels_of(scene: Scene, placement: int, finer: Sequence[CuspMesh] = ()) -> l
     levels += [Level("hinged_edge", 0.0, 1.0)]
     if scene.material.bending:
         levels += _steps("clamped_edge", scene.solver.clamp_steps)
-    count = scene.contact.steps
     # lambda = 0 is a level of its own: there the wedge appears
-    levels += [Level("contact_wedge", (k - 1) / count, k / count) for k in range(count + 1)]
+    step = 1.0 / max(len(lambdas) - 1, 1)
+    levels += [Level("contact_wedge", stop - step, stop) for stop in lambdas]
     levels += [Level("refinement", 0.0, 1.0, number + 1) for number in range(len(finer))]
     if scene.material.bending:
         levels += _steps("first_row", _ROW_LEVELS, len(finer))

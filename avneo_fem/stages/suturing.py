@@ -71,7 +71,8 @@ class CuspSuturing:
     ) -> None:
         self.setup, self.observer, self.store, self.finer = setup, observer, store, finer
         self.index = setup.index if index is None else index
-        self.levels = levels_of(setup.scene, setup.placement_k, finer)
+        lambdas = setup.wedges.levels(setup.scene.contact.steps)
+        self.levels = levels_of(setup.scene, setup.placement_k, lambdas, finer)
         self.options = setup.scene.solver
         self.records: list[StageRecord] = []
         self.snapshots: list[Snapshot] = []
