@@ -120,6 +120,14 @@ class Placement(Table):
 class Solver(Table):
     """Continuation and Newton iteration."""
 
+    quality: Literal["equilibrium", "approximate"] = Field(
+        "equilibrium",
+        description="equilibrium converges every level without ever crossing; approximate takes a"
+        " few damped iterations a level and then the crossings apart",
+    )
+    approximate_iterations: Annotated[int, Field(ge=1)] = Field(
+        6, description="iterations a level of quality approximate"
+    )
     tolerance: Positive = Field(
         1e-8, description="final residual relative to the pressure load P x area"
     )
@@ -149,5 +157,6 @@ class Solver(Table):
     inside_tolerance: Positive | None = Field(
         None,
         description="wedge and wall may be short of their clearance by [mm]; default 1 % of H, so"
-        " that cusps are 0.98 H apart",
+        " that cusps are 0.98 H apart; of quality approximate: the mid-surface may lie outside"
+        " wedge and root by [mm], default 10 % of H",
     )

@@ -72,4 +72,5 @@ class Scene(Table):
     def inside_tolerance(self, thickness: float) -> float:
         """By how much a cusp of this thickness may be short of its clearances [mm]."""
         chosen = self.solver.inside_tolerance
-        return 0.01 * thickness if chosen is None else chosen
+        share = 0.01 if self.solver.quality == "equilibrium" else 0.1
+        return share * thickness if chosen is None else chosen

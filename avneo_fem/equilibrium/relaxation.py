@@ -49,13 +49,19 @@ class Relaxation:
     ) -> None:
         self.system, self.newton, self.settings = system, newton, settings
 
-    def damped(self, state: Floats, damping: float, iterations: int) -> tuple[Floats, Verdict]:
-        """One outer step: at most ``iterations`` Newton iterations, damped towards ``state``."""
+    def damped(
+        self, state: Floats, damping: float, iterations: int, tolerance: float | None = None
+    ) -> tuple[Floats, Verdict]:
+        """One outer step: at most ``iterations`` Newton iterations, damped towards ``state``.
+
+        They end at a residual, damping included, of ``tolerance``; None: a tenth of the present.
+        """
         system, settings = self.system, self.settings
         state = renew_directors(system.model, state)
         extra = self._damping(state, damping)
         force = system.relative_residual(state)
-        return self.newton.solve(state, settings.inner_reduction * force, extra, iterations)
+        target = settings.inner_reduction * force if tolerance is None else tolerance
+        return self.newton.solve(state, target, extra, iterations)
 
     def _damping(self, state: Floats, damping: float) -> list[ProximalTerm]:
         system = self.system

@@ -79,6 +79,10 @@ def tolerances_of(given: ValveInput) -> Tolerances:
     clearance beyond the taper.
     """
     scene, geometry = given.scene, given.geometry
+    if scene.solver.quality == "approximate":
+        # no equilibrium and no clearance is claimed, but no crossing, and inside
+        inside = scene.inside_tolerance(min(cusp.thickness for cusp in geometry.cusps))
+        return Tolerances(residual=np.inf, inside_mm=inside, wall_distance_mm=0.0)
     halves = sorted(cusp.thickness / 2 for cusp in geometry.cusps)
     wedge = (
         halves[0] + halves[1] if scene.contact.clearance is None else 2 * scene.contact.clearance

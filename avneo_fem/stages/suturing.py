@@ -76,6 +76,10 @@ class CuspSuturing:
         self.options = setup.scene.solver
         self.records: list[StageRecord] = []
         self.snapshots: list[Snapshot] = []
+        self._prepare(setup)
+
+    def _prepare(self, setup: CuspSetup) -> None:
+        """What a quality changes in a fresh set-up."""
 
     def run(self, resume: bool = False) -> CuspResult:
         """Run all stages; a failure is part of the result, with the last good state."""
@@ -137,6 +141,7 @@ class CuspSuturing:
         coarse = self.setup
         points = prolong(coarse.mesh, coarse.system.positions(state))
         self.setup = coarse.on_mesh(self.finer[level.mesh - 1], points)
+        self._prepare(self.setup)
         self.snapshots = [
             Snapshot(
                 shot.name,
@@ -156,6 +161,7 @@ class CuspSuturing:
         mesh = max((level.mesh for level in behind), default=0)
         if mesh:
             self.setup = self.setup.on_mesh(self.finer[mesh - 1], checkpoint.snapshots[-1].points)
+            self._prepare(self.setup)
         setup = self.setup
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         stiffness = checkpoint.penalty_stiffness
@@ -324,7 +330,14 @@ class CuspSuturing:
 
         return safe
 
-    def _settle(self, state: Floats) -> Outcome:
+    def _blocked(self, state: Floats, move: Floats) -> str | None:
+        """Why a move (n, 3) of the nodes cannot be made, None when it can."""
+        setup = self.setup
+        clear = setup.contact.step_fraction(setup.system.positions(state), move)
+        return None if clear == 1.0 else f"layers would collide after {clear:.2f} of the step"
+
+    def _settle(self, before: Floats, state: Floats) -> Outcome:
+        """Equilibrium from ``state``, which was reached from ``before`` without a collision."""
         tolerance, budget = self.options.path_tolerance, self.options.maximum_iterations
         self.setup.clamp.renew(self.setup.system.positions(state))
         settled, verdict = self.setup.relaxation.settle(state, tolerance, _SETTLE_DAMPING, budget)
@@ -341,23 +354,24 @@ class CuspSuturing:
     def _move(self, state: Floats, start: float, stop: float) -> Outcome:
         setup, model = self.setup, self.setup.model
         move = (stop - start) * self._way
-        clear = setup.contact.step_fraction(setup.system.positions(state), move)
-        if clear < 1.0:
-            return None, f"layers would collide after {clear:.2f} of the step"
+        blocked = self._blocked(state, move)
+        if blocked:
+            return None, blocked
         trial = state.copy()
         trial[model.position_dofs] += move
         line = setup.mesh.suture_line
         trial[model.position_dofs[line]] = setup.start[line] + stop * (
             setup.target - setup.start[line]
         )
-        return self._damped(trial)
+        return self._damped(state, trial)
 
     def _follow_mesh(self, state: Floats, start: float, stop: float) -> Outcome:
         """Move the new sutured nodes to their line; once there, clamp them and settle."""
         moved, reason = self._move(state, start, stop)
         if moved is None or stop < 1.0:
             return moved, reason
-        return self._settle(self._turned(moved, ~self.setup.row.is_blocked, 1.0))
+        # ``_move`` has left no crossing behind
+        return self._settle(moved, self._turned(moved, ~self.setup.row.is_blocked, 1.0))
 
     def _turned(self, state: Floats, chosen: NDArray[np.bool_], share: float) -> Floats:
         """State with chosen suture edges (k-1,) turned by a share of what is missing to the
@@ -370,13 +384,13 @@ class CuspSuturing:
         state[model.angle_dofs[self._suture_edges(chosen)]] += share * rest[chosen]
         return state
 
-    def _damped(self, trial: Floats) -> Outcome:
+    def _damped(self, before: Floats, trial: Floats) -> Outcome:
         relaxation = self.setup.relaxation
         state, verdict = relaxation.damped(trial, _BOUNDARY_DAMPING, _BOUNDARY_ITERATIONS)
         return (state if np.isfinite(verdict.residual) else None), verdict.reason
 
     def _settle_hinged(self, state: Floats, _start: float, _stop: float) -> Outcome:
-        return self._settle(state)
+        return self._settle(state, state)
 
     def _turn_edge(self, state: Floats, start: float, stop: float) -> Outcome:
         """Turn the suture edges by their share of what is missing to the tangent half-plane.
@@ -387,7 +401,7 @@ class CuspSuturing:
         trial = self._turned(state, free, (stop - start) / (1.0 - start))
         full, count = setup.scene.clamp.stiffness, self.options.clamp_steps
         setup.clamp.stiffness = full * 4.0 ** (count * (stop - 1.0))
-        return self._settle(trial)
+        return self._settle(state, trial)
 
     def _lay_row(self, state: Floats, start: float, stop: float) -> Outcome:
         """Lay down the nodes that have no room in their half-plane, and clamp their edges."""
@@ -399,18 +413,23 @@ class CuspSuturing:
         away = row.on_the_way(points[row.nodes], share) - points[row.nodes]
         held = np.r_[line, row.nodes]
         move = harmonic_extension(setup.mesh, held, np.vstack([np.zeros((len(line), 3)), away]))
-        clear = setup.contact.step_fraction(points, move)
-        if clear < 1.0:
-            return None, f"layers would collide after {clear:.2f} of the step"
+        blocked = self._blocked(state, move)
+        if blocked:
+            return None, blocked
         trial = state.copy()
         trial[setup.model.position_dofs] += move
-        return self._settle(self._turned(trial, row.is_blocked, share))
+        return self._settle(state, self._turned(trial, row.is_blocked, share))
 
     def _close_wedge(self, state: Floats, _start: float, stop: float) -> Outcome:
         self.setup.wedge.field = self.setup.wedges.wedge(self.setup.index, max(stop, 0.0))
-        return self._settle(state)
+        return self._settle(state, state)
 
     # -- last stages -----------------------------------------------------------------------
+    def outside(self, points: Floats) -> tuple[float, float]:
+        """Largest depth of a node outside the root and outside the contact wedge [mm]."""
+        wall, wedge = self.setup.wall.evaluate(points)[0], self.setup.wedge.evaluate(points)[0]
+        return float((-wall).max(initial=0.0)), float((-wedge).max(initial=0.0))
+
     def shortfalls(self, points: Floats) -> tuple[float, float, float]:
         """How far wall, wedge and clamp are from what they must hold.
 

@@ -10,6 +10,7 @@ from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.refine import nested_meshes
 from avneo_fem.scene import Template
+from avneo_fem.stages.approximate import ApproximateSuturing
 from avneo_fem.stages.checkpoint import CheckpointStore
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.record import CuspResult, StageRecord
@@ -88,7 +89,8 @@ def suture_valve(
         first, *finer = meshes[scene.cusp[index].template]
         own = given.seen_from(index)
         setup = CuspSetup(own.scene, own.geometry, own.wedges, 0, first)
-        result = CuspSuturing(setup, observer, store, finer, index).run(resume)
+        stages = CuspSuturing if scene.solver.quality == "equilibrium" else ApproximateSuturing
+        result = stages(setup, observer, store, finer, index).run(resume)
         mine.append(to_its_place(own.geometry, given.geometry, result) if index else result)
     gathered = comm.gather(mine, root=0)
     if comm.rank != 0:

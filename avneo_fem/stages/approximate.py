@@ -1,0 +1,130 @@
+"""The quick way: a few damped Newton iterations at the end, then what crosses is taken apart.
+
+The paper's Algorithm 1.1 (SolveQSEProb) stops after a few iterations and repairs what crosses as
+Bridson et al. do. Levels, constraints and record are those of ``stages.suturing``, and on the
+coarser meshes, where that is quick, so are the solves: the cusp comes to the finest mesh inside
+and free of crossings. There no level converges: a few iterations without barrier and collision
+filter, and a step that ``constraints.collision_response`` has freed of crossings, or a named
+failure.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avneo_fem.constraints.collision_response import CrossingsRemain, resolve
+from avneo_fem.stages.continuation import StageFailed
+from avneo_fem.stages.cusp_setup import CuspSetup
+from avneo_fem.stages.levels import Level
+from avneo_fem.stages.suturing import CuspSuturing, Outcome
+
+__all__ = ["ApproximateSuturing"]
+
+Floats = NDArray[np.float64]
+
+#: dampings, in units of E H / R^2
+_BOUNDARY_DAMPING, _DAMPING = 1.5, 0.3
+#: rounds of raising penalties, at most
+_ROUNDS = 12
+#: times that nodes are moved inside wall and wedge in turns
+_PUSHES = 3
+
+
+class ApproximateSuturing(CuspSuturing):
+    """Stages of one cusp in ``solver.quality = "approximate"``."""
+
+    def _prepare(self, setup: CuspSetup) -> None:
+        if self._is_quick(setup):
+            # crossings are resolved after the iterations, not prevented during them
+            setup.system.contact = None
+
+    def _is_quick(self, setup: CuspSetup) -> bool:
+        return bool(self.finer) and setup.mesh is self.finer[-1]
+
+    def _enter_mesh(self, level: Level, state: Floats) -> Floats:
+        if level.mesh == len(self.finer):
+            state = self._raise_until_inside(state)
+        return super()._enter_mesh(level, state)
+
+    def _few_iterations(self, before: Floats, start: Floats, damping: float) -> Outcome:
+        """Iterations from the state ``start``, the way there from ``before`` freed of crossings."""
+        setup, relaxation = self.setup, self.setup.relaxation
+        count = self.options.approximate_iterations
+        state, verdict = relaxation.damped(start, damping, count, self.options.path_tolerance)
+        if not np.isfinite(verdict.residual):
+            return None, verdict.reason
+        held = setup.system.fixed[setup.model.position_dofs].any(axis=1)
+        try:
+            found = resolve(
+                setup.mesh.triangles,
+                setup.system.positions(before),
+                self._pushed_inside(setup.system.positions(state), held),
+                setup.mesh.node_areas,
+                held,
+                setup.contact.distance,
+                rest=np.c_[setup.mesh.points, np.zeros(len(setup.mesh.points))],
+            )
+        except CrossingsRemain as error:
+            return None, str(error)
+        state[setup.model.position_dofs] = found.points
+        return state, (
+            f"{verdict.iterations} damped iterations, {found.impulses} impulses, "
+            f"{found.zones} impact zones"
+        )
+
+    def _pushed_inside(self, points: Floats, held: NDArray[np.bool_]) -> Floats:
+        """Positions with free nodes that are outside root or wedge moved to the border."""
+        result = points.copy()
+        for _ in range(_PUSHES):
+            for term in (self.setup.wall, self.setup.wedge):
+                if term not in self.setup.system.terms:
+                    continue
+                distance, normal, _ = term.field.evaluate(result)
+                out = (distance < 0.0) & ~held
+                result[out] -= distance[out, None] * normal[out]
+        return result
+
+    def _blocked(self, state: Floats, move: Floats) -> str | None:
+        # on the finest mesh the resolver sees to it
+        return None if self._is_quick(self.setup) else super()._blocked(state, move)
+
+    def _damped(self, before: Floats, trial: Floats) -> Outcome:
+        if not self._is_quick(self.setup):
+            return super()._damped(before, trial)
+        return self._few_iterations(before, trial, _BOUNDARY_DAMPING)
+
+    def _settle(self, before: Floats, state: Floats) -> Outcome:
+        if not self._is_quick(self.setup):
+            return super()._settle(before, state)
+        self.setup.clamp.renew(self.setup.system.positions(state))
+        return self._few_iterations(before, state, _DAMPING)
+
+    def _raise_until_inside(self, state: Floats) -> Floats:
+        """Raise the penalties until the cusp is inside wall and wedge (§3.4 step 3)."""
+        setup, scene = self.setup, self.setup.scene
+        allowed = scene.inside_tolerance(setup.cusp.thickness)
+        limits = scene.wall.maximum_stiffness, scene.contact.maximum_stiffness
+        for _ in range(_ROUNDS):
+            misses = self.outside(setup.system.positions(state))
+            if max(misses) <= allowed:
+                return state
+            for term, miss, limit in zip((setup.wall, setup.wedge), misses, limits, strict=True):
+                if miss > allowed:
+                    factor = min(scene.wall.growth, 1.3 * miss / allowed)
+                    term.stiffness = min(limit, factor * term.stiffness)
+            clock, used = time.perf_counter(), setup.newton.iterations
+            found, reason = self._settle(state, state)
+            if found is None:
+                raise StageFailed(f"root_wall: {reason}", state, setup.wall.stiffness, 0)
+            state = found
+            self._keep(state, "root_wall", setup.wall.stiffness, used, reason, clock, 1, None)
+        wall, wedge = self.outside(setup.system.positions(state))
+        message = (
+            f"root_wall: outside the root by {wall:.3f} mm and the contact wedge by {wedge:.3f} mm"
+            f" after {_ROUNDS} rounds; raise solver.approximate_iterations or take"
+            ' solver.quality = "equilibrium"'
+        )
+        raise StageFailed(message, state, setup.wall.stiffness, 0)
