@@ -50,7 +50,8 @@ def test_rigid_motions_and_balance(is_edges: bool) -> None:
     corners = pairs(50, 2)
     distance, weights = pair_distance(corners, is_edges)
     gradient, hessian = pair_distance_derivatives(corners, weights, is_edges)
-    assert pair_distance(corners + [3.0, -4.0, 5.0], is_edges)[0] == pytest.approx(distance)
+    moved = corners + np.array([3.0, -4.0, 5.0])
+    assert pair_distance(moved, is_edges)[0] == pytest.approx(distance)
     np.testing.assert_allclose(gradient.reshape(-1, 4, 3).sum(axis=1), 0.0, atol=1e-12)
     shifts = np.tile(np.eye(3), (4, 1))
     size = np.abs(hessian).max(axis=(1, 2))[:, None, None]

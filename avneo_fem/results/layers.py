@@ -21,9 +21,7 @@ def least_way_between_layers(thickness: float, clearance: float) -> float:
     """Distance in the template from which two places of a sheet count as layers [mm].
 
     max(2 H, pi/2 c): two thicknesses, and at least the half circle that a fold around a gap of
-    ``clearance`` c takes. By Schur's comparison theorem a sheet that is nowhere curved more
-    tightly than that half circle, radius c/2, keeps places this far apart along it at least c
-    apart in space, so bending alone, without a second layer, cannot fail.
+    ``clearance`` c takes.
 
     Parameters
     ----------
@@ -34,8 +32,14 @@ def least_way_between_layers(thickness: float, clearance: float) -> float:
 
 
 def search_radius(thickness: float, clearance: float) -> float:
-    """Layers farther apart than this are not looked for, max(2 H, 2 c) [mm]."""
-    return 2.0 * max(thickness, clearance)
+    """Layers farther apart than this are not looked for, max(4 H/pi, c) [mm].
+
+    It is the diameter of the half circle that :func:`least_way_between_layers` makes. By Schur's
+    comparison theorem a sheet that is nowhere curved more tightly than that keeps places so far
+    apart along it at least a diameter apart in space: so bending alone, without a fold back, is
+    never taken for a second layer.
+    """
+    return 2.0 / np.pi * least_way_between_layers(thickness, clearance)
 
 
 def _nearest_corners(a: Array, b: Array) -> Array:
@@ -102,9 +106,9 @@ def closest_layers(
     Two triangles belong to different layers when all of one is at least
     :func:`least_way_between_layers` from all of the other in the flat template; distance in the
     template is straight. So triangles that share a node are never layers, and a sheet that is
-    flat or gently curved has none that come near. Distances are those of the flat triangles,
-    faces and edges included; layers that cross are 0 apart. What is not below
-    :func:`search_radius` is infinity.
+    flat or gently curved has none that come near (:func:`search_radius`). Distances are those of
+    the flat triangles, faces and edges included; layers that cross are 0 apart. What is not below
+    the search radius is infinity.
 
     Parameters
     ----------

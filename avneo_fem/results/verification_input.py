@@ -24,6 +24,7 @@ def surface_of(geometry: ValveGeometry, result: CuspResult) -> CuspSurface:
     arc = mesh.suture_arc_length
     return CuspSurface(
         points=result.points,
+        template_points=mesh.points,
         triangles=mesh.triangles,
         suture_nodes=mesh.suture_line,
         suture_targets=cusp.sutured_position(arc),
@@ -52,6 +53,8 @@ def constraints_of(
         plane_normal=plane.normal,
         free_edge_clearance=scene.free_edge.clearance,
         taper=5 * thickness if scene.wall.taper is None else scene.wall.taper,
+        layer_clearance=scene.layer_clearance(thickness),
+        unrestricted=scene.layers_unrestricted(thickness),
     )
 
 
@@ -59,7 +62,8 @@ def tolerances_of(scene: Scene, geometry: ValveGeometry) -> Tolerances:
     """What a verified result of this scene must keep.
 
     Mid-surfaces of different cusps keep the sum of their clearances, but no more than the
-    sutured edges themselves are apart; the wall its clearance beyond the taper.
+    sutured edges themselves are apart; the wall its clearance beyond the taper; layers that of the
+    thinnest cusp.
     """
     halves = sorted(cusp.thickness / 2 for cusp in geometry.cusps)
     wedge = (
@@ -75,4 +79,5 @@ def tolerances_of(scene: Scene, geometry: ValveGeometry) -> Tolerances:
         wall_distance_mm=max(
             halves[0] if scene.wall.clearance is None else scene.wall.clearance, 0.0
         ),
+        layer_distance_mm=scene.layer_clearance(2 * halves[0]),
     )
