@@ -7,8 +7,14 @@ import pytest
 
 from avneo_fem.constraints.layer_clearance import LayerClearance
 from avneo_fem.constraints.layer_pairs import LayerPairs
+from avneo_fem.constraints.pair_distance import pair_distance
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.results.layers import closest_layers, least_way_between_layers
+from avneo_fem.results.proximity import (
+    point_triangle_distance,
+    segment_distance,
+    triangle_distance,
+)
 from layer_cases import THICKNESS, cylinder, fold, strip
 from shell_cases import rotation
 from term_cases import check_derivatives
@@ -229,29 +235,30 @@ def test_kept_pairs_follow_the_points() -> None:
 
 
 def test_pairs_are_those_of_the_judges_definition() -> None:
-    """Truth: brute force over all pairs of triangles of a coarse strip: layers are what the judge's
-    module calls so, and every part of them that is within reach is listed, once."""
-    mesh = strip(1.0)
-    points = fold(mesh, 0.2)
+    """Truth: brute force with the judge's distances over all pairs of triangles: those at least
+    ``way`` apart in the template, all nodes beyond 2 mm; of their points, faces and edges exactly
+    those within reach, each once; the list may hold farther ones."""
+    mesh = strip(0.5)
+    points = crumpled(mesh, 0.2, 3)
     way, reach = least_way_between_layers(THICKNESS, CLEARANCE), 0.3
+    away = mesh.triangles[(mesh.distance_to_suture[mesh.triangles] >= 2.0).all(axis=1)]
+    i, j = (k.ravel() for k in np.indices((len(away), len(away))))
+    flat = np.c_[mesh.points, np.zeros(len(mesh.points))][away]
+    layers = triangle_distance(flat[i], flat[j]) >= way
+    first, second = away[i[layers]], away[j[layers]]
+    corner = np.vstack([np.c_[first[:, k], second] for k in range(3)])
+    near = point_triangle_distance(points[corner[:, 0]], points[corner[:, 1:]]) < reach
+    expected_points = {tuple(row) for row in corner[near]}
+    sides = [(0, 1), (1, 2), (2, 0)]
+    edge = np.vstack([np.c_[first[:, a], second[:, b]] for a in sides for b in sides])
+    near = segment_distance(*(points[edge[:, k]] for k in range(4))) < reach
+    expected_edges = {
+        tuple(sorted((tuple(sorted(row[:2])), tuple(sorted(row[2:]))))) for row in edge[near]
+    }
     pairs = LayerPairs(mesh.points, mesh.triangles, mesh.distance_to_suture, 2.0, way, reach)
     nodes, edges = pairs.at(points)
-    for found in (nodes, edges):
-        assert len(np.unique(found, axis=0)) == len(found) > 0
-        assert mesh.distance_to_suture[found].min() >= 2.0
-    listed = {tuple(row) for row in nodes}
-    x = mesh.points[:, 0]
-    away = mesh.triangles[(x[mesh.triangles] >= 2.0).all(axis=1)]
-    for first in away:
-        for second in away:
-            flat_gap = max(
-                x[second].min() - x[first].max(),
-                x[first].min() - x[second].max(),
-            )
-            corners = points[first], points[second]
-            gap = np.maximum(
-                corners[0].min(axis=0) - corners[1].max(axis=0),
-                corners[1].min(axis=0) - corners[0].max(axis=0),
-            ).max()
-            if flat_gap >= way and gap < 0.21:
-                assert (first[0], *second) in listed or (second[0], *first) in listed
+    found = pair_distance(points[nodes], False)[0] < reach
+    assert sorted(map(tuple, nodes[found])) == sorted(expected_points)
+    found = pair_distance(points[edges], True)[0] < reach
+    assert sorted((tuple(r[:2]), tuple(r[2:])) for r in edges[found]) == sorted(expected_edges)
+    assert min(len(expected_points), len(expected_edges)) > 50

@@ -6,6 +6,9 @@ A list of pairs made with some room to spare stays complete until a node has mov
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import reduce
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -40,7 +43,17 @@ def _primitives(first: Ints, second: Ints) -> tuple[Ints, Ints]:
 def _balls(corners: Floats) -> tuple[Floats, Floats]:
     """Centres and radii of balls around triangles (m, 3, 3)."""
     centre = corners.mean(axis=1)
-    return centre, np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    offset = corners - centre[:, None]
+    return centre, np.sqrt(np.einsum("kij,kij->ki", offset, offset).max(axis=1))
+
+
+def _boxes_near(first: Sequence[Floats], second: Sequence[Floats], reach: float) -> Bools:
+    """(k,) whether the boxes around nodes (k, 3) of both sides are less than ``reach`` apart."""
+    (low, high), (other_low, other_high) = (
+        (reduce(np.minimum, side), reduce(np.maximum, side)) for side in (first, second)
+    )
+    near: Bools = (np.maximum(low - other_high, other_low - high) < reach).all(axis=1)
+    return near
 
 
 def _near_balls(corners: Floats, reach: float) -> Ints:
@@ -49,8 +62,10 @@ def _near_balls(corners: Floats, reach: float) -> Ints:
         return np.empty((0, 2), np.int64)
     centre, radius = _balls(corners)
     pairs = cKDTree(centre).query_pairs(reach + 2 * radius.max(), output_type="ndarray")
-    apart = np.linalg.norm(centre[pairs[:, 0]] - centre[pairs[:, 1]], axis=1)
-    near: Ints = pairs[apart < reach + radius[pairs].sum(axis=1)].astype(np.int64)
+    first, second = pairs.T
+    offset = centre[first] - centre[second]
+    bound = reach + radius[first] + radius[second]
+    near: Ints = pairs[np.einsum("kd,kd->k", offset, offset) < bound**2].astype(np.int64)
     return near
 
 
@@ -82,7 +97,7 @@ class LayerPairs:
         way: float,
         reach: float,
     ) -> None:
-        self.reach, self._room = reach, 0.5 * reach
+        self.reach, self._room = reach, reach
         away = (distance_to_suture[triangles] >= unrestricted).all(axis=1)
         self.triangles = triangles[away].astype(np.int64)
         self._near = self._neighbours(template_points, way)
@@ -105,7 +120,8 @@ class LayerPairs:
             distance = pair_distance(flat[nodes.reshape(-1, 4)], is_edges)[0]
             least = np.minimum(least, distance.reshape(nodes.shape[:2]).min(axis=1))
         near[doubtful] = least < way
-        return np.sort(self._keys(pairs[near]))
+        # with a last one that no pair has, for the search
+        return np.append(np.sort(self._keys(pairs[near])), np.iinfo(np.int64).max)
 
     def _keys(self, pairs: Ints) -> Ints:
         keys: Ints = pairs.min(axis=1) * len(self.triangles) + pairs.max(axis=1)
@@ -120,19 +136,31 @@ class LayerPairs:
             moved = np.square(points - self._built_at).sum(axis=1).max(initial=0.0)
             if moved <= (self._room / 2) ** 2:
                 return self._points, self._edges
-        pairs = _near_balls(points[self.triangles], self.reach + self._room)
-        pairs = pairs[~np.isin(self._keys(pairs), self._near)]
-        self._points, self._edges = self._unique(pairs)
+        within = self.reach + self._room
+        corners = points[self.triangles]
+        pairs = _near_balls(corners, within)
+        keys = self._keys(pairs)
+        place = np.searchsorted(self._near, keys)
+        pairs = pairs[self._near[place] != keys]
+        found = _primitives(self.triangles[pairs[:, 0]], self.triangles[pairs[:, 1]])
+        self._points, self._edges = (
+            self._nearer_than(within, points, nodes.reshape(-1, 4), is_edges)
+            for nodes, is_edges in zip(found, (False, True), strict=True)
+        )
         self._built_at = points.copy()
         return self._points, self._edges
 
-    def _unique(self, pairs: Ints) -> tuple[Ints, Ints]:
-        if not len(pairs):
-            return (np.empty((0, 4), np.int64),) * 2
-        first, second = self.triangles[pairs[:, 0]], self.triangles[pairs[:, 1]]
-        points, edges = (nodes.reshape(-1, 4) for nodes in _primitives(first, second))
-        ends = np.sort(edges.reshape(-1, 2, 2), axis=2)
-        swap = ends[:, 0, 0] * (ends.max() + 1) + ends[:, 0, 1]
-        swapped = swap > ends[:, 1, 0] * (ends.max() + 1) + ends[:, 1, 1]
-        ends[swapped] = ends[swapped][:, ::-1]
-        return np.unique(points, axis=0), np.unique(ends.reshape(-1, 4), axis=0)
+    @staticmethod
+    def _nearer_than(within: float, points: Floats, nodes: Ints, is_edges: bool) -> Ints:
+        """Those of the pairs (k, 4) that are nearer, each once, the smaller numbers first."""
+        corners = [points[nodes[:, k]] for k in range(4)]
+        sides = 2 if is_edges else 1
+        nodes = nodes[_boxes_near(corners[:sides], corners[sides:], within)]
+        nodes = nodes[pair_distance(points[nodes], is_edges)[0] < within]
+        if is_edges:
+            ends = np.sort(nodes.reshape(-1, 2, 2), axis=2)
+            # layers share no node, so the first ends tell the edges apart
+            order = np.argsort(ends[:, :, 0], axis=1)
+            nodes = np.take_along_axis(ends, order[:, :, None], axis=1).reshape(-1, 4)
+        once: Ints = np.unique(nodes, axis=0)
+        return once
