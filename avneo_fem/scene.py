@@ -9,7 +9,17 @@ and ``scene_method`` (the tables), ``scene_schema`` (:class:`Scene`) and ``scene
 from __future__ import annotations
 
 from avneo_fem.scene_file import load_scene, parse_scene
-from avneo_fem.scene_method import Clamp, Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
+from avneo_fem.scene_method import (
+    Clamp,
+    Contact,
+    FreeEdge,
+    Layers,
+    Material,
+    Mesh,
+    Placement,
+    Solver,
+    Wall,
+)
 from avneo_fem.scene_schema import FIDELITIES, Scene
 from avneo_fem.scene_tables import (
     Commissures,
@@ -29,6 +39,7 @@ __all__ = [
     "Contact",
     "Cusp",
     "FreeEdge",
+    "Layers",
     "Material",
     "Mesh",
     "Placement",

@@ -17,6 +17,7 @@ __all__ = [
     "Contact",
     "ContactMethod",
     "FreeEdge",
+    "Layers",
     "Material",
     "Mesh",
     "Placement",
@@ -96,6 +97,24 @@ class Wall(Table):
     growth: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
         10.0, description="factor at most by which eta_1 is raised until the cusp is inside"
     )
+    maximum_stiffness: Positive = Field(1e6, description="eta_1 is not raised beyond [kPa]")
+
+
+class Layers(Table):
+    """How near the layers of one cusp, which never cross, may come to each other."""
+
+    clearance: NonNegative | None = Field(
+        None,
+        description="distance that layers keep away from the suture [mm]; 0 asks only that they do"
+        " not cross, default half the thickness",
+    )
+    unrestricted: NonNegative | None = Field(
+        None,
+        description="distance from the suture in the template within which they may come nearer,"
+        " since the gather leaves no room [mm]; default 4 H",
+    )
+    stiffness: Positive = Field(16.0, description="eta_1 at the start [kPa]")
+    width: Positive = Field(0.1, description="eta_2 [mm]")
     maximum_stiffness: Positive = Field(1e6, description="eta_1 is not raised beyond [kPa]")
 
 

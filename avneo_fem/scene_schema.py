@@ -7,7 +7,17 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from avneo_fem.scene_method import Clamp, Contact, FreeEdge, Material, Mesh, Placement, Solver, Wall
+from avneo_fem.scene_method import (
+    Clamp,
+    Contact,
+    FreeEdge,
+    Layers,
+    Material,
+    Mesh,
+    Placement,
+    Solver,
+    Wall,
+)
 from avneo_fem.scene_tables import (
     Commissures,
     Competence,
@@ -46,6 +56,7 @@ class Scene(Table):
     contact: Contact = Field(default_factory=Contact)
     wall: Wall = Field(default_factory=Wall)
     clamp: Clamp = Field(default_factory=Clamp)
+    layers: Layers = Field(default_factory=Layers)
     mesh: Mesh = Field(default_factory=Mesh)
     placement: Placement = Field(default_factory=Placement)
     solver: Solver = Field(default_factory=Solver)
@@ -68,6 +79,16 @@ class Scene(Table):
         if chosen is not None:
             return chosen
         return max(0, int(np.floor(np.log2(self.root.radius / 4 / self.mesh_size))))
+
+    def layer_clearance(self, thickness: float) -> float:
+        """Distance that layers of a cusp of this thickness keep away from its suture [mm]."""
+        chosen = self.layers.clearance
+        return thickness / 2 if chosen is None else chosen
+
+    def layers_unrestricted(self, thickness: float) -> float:
+        """Distance from the suture within which layers of this thickness are left alone [mm]."""
+        chosen = self.layers.unrestricted
+        return 4 * thickness if chosen is None else chosen
 
     def inside_tolerance(self, thickness: float) -> float:
         """By how much a cusp of this thickness may be short of its clearances [mm]."""

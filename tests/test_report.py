@@ -77,7 +77,7 @@ def result(given: ValveInput, index: int, copied_from: int | None = None) -> Cus
 
 
 def measured(residual: float = 1e-9) -> CuspVerification:
-    return CuspVerification(residual, 1e-12, (31.0, 12.0), 0.0, 0.01, 0.0, 0, 0.24)
+    return CuspVerification(residual, 1e-12, (31.0, 12.0), 0.0, 0.01, 0.0, 0, 0.24, np.inf, 0.07)
 
 
 def report(given: ValveInput, failures: list[str]) -> dict[str, Any]:
@@ -112,6 +112,8 @@ def test_report_says_what_it_was_given() -> None:
     assert cusps[1]["residual"] == 2e-9
     assert cusps[0]["clamp_error_deg"] == {"largest": 31.0, "rms": 12.0}
     assert cusps[0]["outside_wedge_mm"] == 0.01
+    assert cusps[0]["closest_layers_near_suture_mm"] == 0.07
+    assert json.loads(to_json(good))["cusps"][0]["closest_layers_mm"] is None  # none near
     assert cusps[0]["stages"][0] == {
         "name": "boundary",
         "parameter": 0.1,

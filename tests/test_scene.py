@@ -55,6 +55,7 @@ def test_defaults_are_experiment_1() -> None:
     # not Table 1's 8 kPa and 0.5 mm: docs/scene.md says why
     assert (scene.wall.stiffness, scene.wall.width) == (64.0, 0.1)
     assert (scene.mesh.size, scene.contact.steps) == (0.7, 10)
+    assert (scene.layer_clearance(0.5), scene.layers_unrestricted(0.5)) == (0.25, 2.0)
     assert (scene.placement.c0, scene.placement.c1) == (1.0, 0.1)
     assert (scene.competence.minimum_nu, scene.competence.maximum_nu) == (0.5, 1.05)
     assert scene.cusp[1] == scene.cusp[2] == scene.cusp[0]
@@ -157,6 +158,7 @@ def test_unknown_key_without_a_near_one(data: dict[str, Any], known: list[str]) 
         ({"contact": {"steps": 1.5}}, "contact.steps", 1.5, "an integer >= 1"),
         ({"contact": {"steps": 0}}, "contact.steps", 0, "an integer >= 1"),
         ({"contact": {"clearance": -1}}, "contact.clearance", -1, ">= 0, or left out"),
+        ({"layers": {"unrestricted": -1}}, "layers.unrestricted", -1, ">= 0, or left out"),
         ({"material": {"bending": 1}}, "material.bending", 1, "true or false"),
         ({"fidelity": "best"}, "fidelity", "best", '"draft" or "standard"'),
         ({"name": ""}, "name", "", "letters, digits"),

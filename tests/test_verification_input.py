@@ -43,6 +43,7 @@ def test_surface(number: int, index: int) -> None:
     assert surface.thickness == 0.5
     np.testing.assert_array_equal(surface.points, flat.points)
     np.testing.assert_array_equal(surface.triangles, mesh.triangles)
+    np.testing.assert_array_equal(surface.template_points, mesh.points)
     share = mesh.suture_arc_length
     by_hand = cusp.suture_line.point(cusp.stitching.annulus_arc_length(share))
     assert suture_error_mm(by_hand, surface.suture_targets) == 0.0
@@ -107,7 +108,8 @@ def test_constraints_agree_with_the_solvers(number: int) -> None:
 
 
 def test_constraints_follow_the_scene() -> None:
-    """Truth: radius, taper and the free edge's clearance as given; the taper is 5 H of the cusp."""
+    """Truth: radius, taper and the clearances as given; by default the taper is 5 H of the cusp,
+    layers keep H/2 beyond 4 H."""
     tables: dict[str, Any] = {
         "root": {"radius": 13.0},
         "free_edge": {"clearance": -0.2},
@@ -117,11 +119,32 @@ def test_constraints_follow_the_scene() -> None:
     found = [constraints_of(given.scene, given.geometry, given.wedges, i) for i in (0, 1)]
     assert [c.taper for c in found] == [2.5, 2.0]
     assert (found[0].radius, found[0].free_edge_clearance) == (13.0, -0.2)
+    assert [c.layer_clearance for c in found] == [0.25, 0.2]
+    assert [c.unrestricted for c in found] == [2.0, 1.6]
+    given = ValveInput.from_scene(parse_scene({"layers": {"clearance": 0.0, "unrestricted": 0.0}}))
+    nothing = constraints_of(given.scene, given.geometry, given.wedges, 0)
+    assert (nothing.layer_clearance, nothing.unrestricted) == (0.0, 0.0)
     given = ValveInput.from_scene(parse_scene({"wall": {"taper": 0.75}}))
     assert constraints_of(given.scene, given.geometry, given.wedges, 0).taper == 0.75
 
 
 THIN_AND_THICK = [{"template": {"thickness": h}} for h in (0.4, 0.6, 0.5)]
+
+
+@pytest.mark.parametrize(
+    ("tables", "layers"),
+    [
+        ({}, 0.25),
+        ({"cusp": THIN_AND_THICK}, 0.2),
+        ({"layers": {"clearance": 0.0}}, 0.0),
+        ({"layers": {"clearance": 0.4}}, 0.4),
+    ],
+)
+def test_layer_tolerance(tables: dict[str, Any], layers: float) -> None:
+    """Truth: half the thickness of the thinnest cusp, or what the scene asks."""
+    scene = parse_scene(tables)
+    found = tolerances_of(scene, ValveInput.from_scene(scene).geometry)
+    assert found.layer_distance_mm == pytest.approx(layers)
 
 
 @pytest.mark.parametrize(

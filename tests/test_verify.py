@@ -320,11 +320,12 @@ def test_free_edge_sag():
 def patch(height: float) -> CuspSurface:
     """A flat square "cusp" at z = height, sutured along y = 0, its free edge at y = 1."""
     points, triangles = sheet(4)
-    y = points[:, 1].copy()
+    template, y = points[:, :2], points[:, 1].copy()
     points = points + np.array([0.0, 0.0, height])
     sutured, free = np.flatnonzero(y == 0.0), np.flatnonzero(y == 1.0)
     return CuspSurface(
         points=points,
+        template_points=template,
         triangles=triangles,
         suture_nodes=sutured,
         suture_targets=points[sutured],
@@ -345,6 +346,8 @@ BOUNDS = Constraints(
     plane_normal=np.array([0.0, 0.0, 1.0]),
     free_edge_clearance=0.1,
     taper=0.5,
+    layer_clearance=0.05,
+    unrestricted=0.4,
 )
 
 
@@ -357,6 +360,7 @@ def test_verify_valve_of_flat_patches():
     for cusp in valve.cusps:
         assert (cusp.suture_error_mm, cusp.outside_root_mm, cusp.outside_wedge_mm) == (0, 0, 0)
         assert (cusp.clamp_error_deg, cusp.self_intersections) == ((0.0, 0.0), 0)
+        assert (cusp.closest_layers_mm, cusp.closest_layers_near_suture_mm) == (np.inf, np.inf)
     assert (valve.cusp_intersections, valve.min_distance_mm) == (0, pytest.approx(0.8))
     assert valve.min_wall_distance_mm == pytest.approx(2.0 - np.sqrt(2.0))
     upside_down = replace(surfaces[0], distance_to_suture=1.0 - surfaces[0].distance_to_suture)
@@ -365,6 +369,27 @@ def test_verify_valve_of_flat_patches():
     assert only_lower_half.min_distance_mm == np.inf
     [failure] = judge(valve, Tolerances(residual=1e-8))
     assert failure == "cusp 0: free edge sags by 0.4 mm, allowed 0.1 mm"
+
+
+def test_verify_valve_of_a_folded_patch():
+    """Truth: the patch folded at x = 1/2 into layers 0.02 apart, 4 H from the suture and nearer;
+    asked for 0.05 less the tolerance it fails where no suture excuses it."""
+    surface = patch(1.0)
+    x = surface.points[:, 0]
+    upper = x > 0.6
+    points = surface.points.copy()
+    points[upper, 0] = 1.0 - x[upper]
+    points[upper, 2] += 0.02
+    points[(x > 0.4) & ~upper, 2] += 0.01
+    folded = replace(surface, points=points)
+    [cusp] = verify_valve([folded], [BOUNDS], [0.0]).cusps
+    assert cusp.closest_layers_mm == pytest.approx(0.02, abs=2e-3)
+    assert cusp.closest_layers_near_suture_mm == pytest.approx(0.02, abs=2e-3)
+    [cusp] = verify_valve([folded], [replace(BOUNDS, unrestricted=2.0)], [0.0]).cusps
+    assert cusp.closest_layers_mm == np.inf
+    asked = Tolerances(residual=1.0, sag_mm=9.0, inside_mm=0.01, layer_distance_mm=0.05)
+    failures = judge(verify_valve([folded], [BOUNDS], [0.0]), asked)
+    assert sum(text.startswith("cusp 0: layers come within 0.0") for text in failures) == 1
 
 
 def test_verify_valve_of_crossing_patches():
@@ -388,8 +413,14 @@ def test_verify_valve_of_crossing_patches():
         verify_valve([patch(1.0)], [BOUNDS] * 2, [0.0])
 
 
-GOOD = CuspVerification(1e-9, 1e-12, (9.0, 4.0), 0.01, 0.02, 0.05, 0, 0.24)
-LIMITS = Tolerances(residual=1e-8, clamp_deg=5.0, cusp_distance_mm=0.5, wall_distance_mm=0.25)
+GOOD = CuspVerification(1e-9, 1e-12, (9.0, 4.0), 0.01, 0.02, 0.05, 0, 0.24, 0.21, 0.001)
+LIMITS = Tolerances(
+    residual=1e-8,
+    clamp_deg=5.0,
+    cusp_distance_mm=0.5,
+    wall_distance_mm=0.25,
+    layer_distance_mm=0.25,
+)
 
 
 @pytest.mark.parametrize(
@@ -402,6 +433,8 @@ LIMITS = Tolerances(residual=1e-8, clamp_deg=5.0, cusp_distance_mm=0.5, wall_dis
         ("outside_wedge_mm", 0.07, "contact wedge by 0.07 mm"),
         ("free_edge_sag_mm", 0.11, "sags by 0.11 mm"),
         ("self_intersections", 3, "crosses itself in 3 pairs"),
+        ("closest_layers_mm", 0.19, "layers come within 0.19 mm, required 0.2 mm"),
+        ("closest_layers_mm", np.nan, "layers come within nan mm"),
         ("residual", np.nan, "residual nan"),
     ],
 )
@@ -462,4 +495,4 @@ def test_the_judge_shares_nothing_with_the_solver():
                 ), (module, name)
                 if package == "avneo_fem.results" and name.split(".")[2] not in seen:
                     waiting.append(name.split(".")[2])
-    assert {"crossings", "containment", "measures", "verdict"} <= seen
+    assert {"crossings", "containment", "layers", "measures", "verdict"} <= seen

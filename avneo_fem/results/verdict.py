@@ -11,7 +11,11 @@ __all__ = ["CuspVerification", "Tolerances", "ValveVerification", "judge"]
 
 @dataclass(frozen=True)
 class CuspVerification:
-    """What was measured on one cusp; names as in report.json (design.md §2)."""
+    """What was measured on one cusp; names as in report.json (design.md §2).
+
+    The two closest approaches of its layers are infinite where none come near each other
+    (:mod:`avneo_fem.results.layers`).
+    """
 
     residual: float
     suture_error_mm: float
@@ -21,6 +25,8 @@ class CuspVerification:
     free_edge_sag_mm: float
     self_intersections: int
     min_wall_distance_mm: float
+    closest_layers_mm: float
+    closest_layers_near_suture_mm: float
 
 
 @dataclass(frozen=True)
@@ -35,12 +41,13 @@ class ValveVerification:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Largest, and for the two distances smallest, figures of a verified result.
+    """Largest, and for the three distances smallest, figures of a verified result.
 
     ``clamp_deg`` applies to the rms angle; by default it is reported but not judged, since flat
-    triangles show an angle even where a curved cusp is perfectly clamped. The two distances are
-    the clearances asked for between mid-surfaces of different cusps and between mid-surface and
-    wall; a cusp may be short of its own by ``inside_mm``, so two cusps by twice that.
+    triangles show an angle even where a curved cusp is perfectly clamped. The three distances are
+    the clearances asked for between mid-surfaces of different cusps, between mid-surface and wall,
+    and between layers of one cusp away from its suture; a cusp may be short of its own by
+    ``inside_mm``, so two cusps by twice that.
     """
 
     residual: float
@@ -50,6 +57,7 @@ class Tolerances:
     clamp_deg: float = np.inf
     cusp_distance_mm: float = 0.0
     wall_distance_mm: float = 0.0
+    layer_distance_mm: float = 0.0
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -63,6 +71,7 @@ def judge(valve: ValveVerification, tolerances: Tolerances) -> list[str]:
     A figure that is not a number fails.
     """
     failures = []
+    short = tolerances.inside_mm
 
     def demand(holds: bool, text: str) -> None:
         if not holds:
@@ -82,9 +91,11 @@ def judge(valve: ValveVerification, tolerances: Tolerances) -> list[str]:
             demand(value <= limit, text)
         crossed = cusp.self_intersections
         demand(crossed == 0, f"cusp {index}: crosses itself in {crossed} pairs of triangles")
+        apart, limit = cusp.closest_layers_mm, tolerances.layer_distance_mm - short
+        text = f"cusp {index}: layers come within {apart:.3g} mm, required {limit:.3g} mm"
+        demand(apart >= limit, text)
     crossed = valve.cusp_intersections
     demand(crossed == 0, f"valve: cusps cross each other in {crossed} pairs of triangles")
-    short = tolerances.inside_mm
     for value, limit, what in (
         (valve.min_distance_mm, tolerances.cusp_distance_mm - 2.0 * short, "distance of cusps"),
         (valve.min_wall_distance_mm, tolerances.wall_distance_mm - short, "distance from the wall"),

@@ -25,6 +25,7 @@ def surface_of(geometry: ValveGeometry, result: CuspResult) -> CuspSurface:
     arc = mesh.suture_arc_length
     return CuspSurface(
         points=result.points,
+        template_points=mesh.points,
         triangles=mesh.triangles,
         suture_nodes=mesh.suture_line,
         suture_targets=cusp.sutured_position(arc),
@@ -53,6 +54,8 @@ def constraints_of(
         plane_normal=plane.normal,
         free_edge_clearance=scene.free_edge.clearance,
         taper=5 * thickness if scene.wall.taper is None else scene.wall.taper,
+        layer_clearance=scene.layer_clearance(thickness),
+        unrestricted=scene.layers_unrestricted(thickness),
     )
 
 
@@ -76,13 +79,13 @@ def tolerances_of(given: ValveInput) -> Tolerances:
 
     Mid-surfaces of different cusps keep the sum of their clearances from the contact wedge, but
     no more than their sutured edges keep from it or from each other (design.md §1); the wall its
-    clearance beyond the taper.
+    clearance beyond the taper; layers that of the thinnest cusp.
     """
     scene, geometry = given.scene, given.geometry
     if scene.solver.quality == "approximate":
         # no equilibrium and no clearance is claimed, but no crossing, and inside
         inside = scene.inside_tolerance(min(cusp.thickness for cusp in geometry.cusps))
-        return Tolerances(residual=np.inf, inside_mm=inside, wall_distance_mm=0.0)
+        return Tolerances(residual=np.inf, inside_mm=inside)
     halves = sorted(cusp.thickness / 2 for cusp in geometry.cusps)
     wedge = (
         halves[0] + halves[1] if scene.contact.clearance is None else 2 * scene.contact.clearance
@@ -97,4 +100,5 @@ def tolerances_of(given: ValveInput) -> Tolerances:
         wall_distance_mm=max(
             halves[0] if scene.wall.clearance is None else scene.wall.clearance, 0.0
         ),
+        layer_distance_mm=scene.layer_clearance(2 * halves[0]),
     )

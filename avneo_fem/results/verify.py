@@ -20,6 +20,7 @@ from avneo_fem.results.containment import (
     wall_excess,
 )
 from avneo_fem.results.crossings import cusp_intersections, min_distance, self_intersections
+from avneo_fem.results.layers import closest_layers
 from avneo_fem.results.measures import clamp_error_deg, free_edge_sag_mm, suture_error_mm
 from avneo_fem.results.verdict import CuspVerification, Tolerances, ValveVerification, judge
 
@@ -30,6 +31,7 @@ __all__ = [
     "Tolerances",
     "ValveVerification",
     "clamp_error_deg",
+    "closest_layers",
     "cusp_intersections",
     "free_edge_sag_mm",
     "judge",
@@ -56,6 +58,8 @@ class CuspSurface:
     ----------
     points : (n, 3) array
         Current positions of all nodes [mm].
+    template_points : (n, 2) array
+        The same nodes in the flat template [mm].
     triangles : (m, 3) array of int
         Corners, counter-clockwise in the template; a quadratic triangle is given as four.
     suture_nodes, suture_targets : (k,) array of int, (k, 3) array
@@ -78,6 +82,7 @@ class CuspSurface:
     """
 
     points: Array
+    template_points: Array
     triangles: Indices
     suture_nodes: Indices
     suture_targets: Array
@@ -91,6 +96,7 @@ class CuspSurface:
     def __post_init__(self) -> None:
         expected = {
             "points": (len(self.points), 3),
+            "template_points": (len(self.points), 2),
             "triangles": (len(self.triangles), 3),
             "suture_targets": (len(self.suture_nodes), 3),
             "suture_edges": (len(self.suture_edges), 2),
@@ -109,7 +115,7 @@ class CuspSurface:
 
 @dataclass(frozen=True)
 class Constraints:
-    """What a cusp must stay within; everything is common to the three but the wedge.
+    """What a cusp must stay within; root and plane are common to the three.
 
     Parameters
     ----------
@@ -125,6 +131,10 @@ class Constraints:
         d_0 of (1.6) [mm].
     taper : float
         Distance from the suture in the template within which the wall clearance tapers [mm].
+    layer_clearance : float
+        Distance that layers of the cusp keep from each other away from its suture [mm].
+    unrestricted : float
+        Distance from the suture in the template within which they need not [mm].
     """
 
     radius: float
@@ -134,6 +144,8 @@ class Constraints:
     plane_normal: Array
     free_edge_clearance: float
     taper: float
+    layer_clearance: float
+    unrestricted: float
 
 
 def verify_cusp(
@@ -152,6 +164,15 @@ def verify_cusp(
         figure that is passed through.
     """
     points, triangles = surface.points, surface.triangles
+    beyond, near_suture = closest_layers(
+        points,
+        surface.template_points,
+        triangles,
+        surface.distance_to_suture,
+        constraints.unrestricted,
+        surface.thickness,
+        constraints.layer_clearance,
+    )
     return CuspVerification(
         residual=float(residual),
         suture_error_mm=suture_error_mm(points[surface.suture_nodes], surface.suture_targets),
@@ -171,6 +192,8 @@ def verify_cusp(
         min_wall_distance_mm=min_wall_distance(
             points, constraints.radius, surface.distance_to_suture, constraints.taper
         ),
+        closest_layers_mm=beyond,
+        closest_layers_near_suture_mm=near_suture,
     )
 
 

@@ -1,11 +1,11 @@
-"""The quick way: a few damped Newton iterations at the end, then what crosses is taken apart.
+"""The quick way: what collides on a move is taken apart, and a few damped iterations are enough.
 
 The paper's Algorithm 1.1 (SolveQSEProb) stops after a few iterations and repairs what crosses as
 Bridson et al. do. Levels, constraints and record are those of ``stages.suturing``, and on the
 coarser meshes, where that is quick, so are the solves: the cusp comes to the finest mesh inside
-and free of crossings. There no level converges: a few iterations without barrier and collision
-filter, and a step that ``constraints.collision_response`` has freed of crossings, or a named
-failure.
+and free of crossings. There a move that collides is not halved but resolved
+(``constraints.collision_response``), and no level converges: a few damped iterations, none of
+which crosses, and an end when the mid-surface is inside.
 """
 
 from __future__ import annotations
@@ -29,78 +29,66 @@ Floats = NDArray[np.float64]
 _BOUNDARY_DAMPING, _DAMPING = 1.5, 0.3
 #: rounds of raising penalties, at most
 _ROUNDS = 12
-#: times that nodes are moved inside wall and wedge in turns
-_PUSHES = 3
+#: the resolver keeps this share of the distance at which the barrier acts
+_RESOLVED = 0.1
 
 
 class ApproximateSuturing(CuspSuturing):
     """Stages of one cusp in ``solver.quality = "approximate"``."""
 
     def _prepare(self, setup: CuspSetup) -> None:
-        if self._is_quick(setup):
-            # crossings are resolved after the iterations, not prevented during them
-            setup.system.contact = None
+        # what has no room in its half-plane is left as it lies
+        self.levels = [level for level in self.levels if level.name != "first_row"]
 
-    def _is_quick(self, setup: CuspSetup) -> bool:
-        return bool(self.finer) and setup.mesh is self.finer[-1]
+    def _is_quick(self) -> bool:
+        return bool(self.finer) and self.setup.mesh is self.finer[-1]
 
     def _enter_mesh(self, level: Level, state: Floats) -> Floats:
         if level.mesh == len(self.finer):
             state = self._raise_until_inside(state)
         return super()._enter_mesh(level, state)
 
-    def _few_iterations(self, before: Floats, start: Floats, damping: float) -> Outcome:
-        """Iterations from the state ``start``, the way there from ``before`` freed of crossings."""
-        setup, relaxation = self.setup, self.setup.relaxation
-        count = self.options.approximate_iterations
-        state, verdict = relaxation.damped(start, damping, count, self.options.path_tolerance)
-        if not np.isfinite(verdict.residual):
-            return None, verdict.reason
+    def _blocked(self, state: Floats, move: Floats) -> str | None:
+        # on the finest mesh collisions of the move are resolved
+        return None if self._is_quick() else super()._blocked(state, move)
+
+    def _damped(self, before: Floats, trial: Floats) -> Outcome:
+        if not self._is_quick():
+            return super()._damped(before, trial)
+        return self._few_iterations(before, trial, _BOUNDARY_DAMPING)
+
+    def _settle(self, before: Floats, state: Floats) -> Outcome:
+        if not self._is_quick():
+            return super()._settle(before, state)
+        self.setup.clamp.renew(self.setup.system.positions(state))
+        return self._few_iterations(before, state, _DAMPING)
+
+    def _few_iterations(self, before: Floats, trial: Floats, damping: float) -> Outcome:
+        """The move from ``before`` to ``trial`` freed of collisions, and iterations from there."""
+        setup = self.setup
         held = setup.system.fixed[setup.model.position_dofs].any(axis=1)
         try:
             found = resolve(
                 setup.mesh.triangles,
                 setup.system.positions(before),
-                self._pushed_inside(setup.system.positions(state), held),
+                setup.system.positions(trial),
                 setup.mesh.node_areas,
                 held,
-                setup.contact.distance,
+                _RESOLVED * setup.contact.distance,
                 rest=np.c_[setup.mesh.points, np.zeros(len(setup.mesh.points))],
             )
         except CrossingsRemain as error:
             return None, str(error)
+        state = trial.copy()
         state[setup.model.position_dofs] = found.points
+        count, tolerance = self.options.approximate_iterations, self.options.path_tolerance
+        state, verdict = setup.relaxation.damped(state, damping, count, tolerance)
+        if not np.isfinite(verdict.residual):
+            return None, verdict.reason
         return state, (
-            f"{verdict.iterations} damped iterations, {found.impulses} impulses, "
-            f"{found.zones} impact zones"
+            f"{found.impulses} impulses, {found.zones} impact zones, "
+            f"{verdict.iterations} damped iterations"
         )
-
-    def _pushed_inside(self, points: Floats, held: NDArray[np.bool_]) -> Floats:
-        """Positions with free nodes that are outside root or wedge moved to the border."""
-        result = points.copy()
-        for _ in range(_PUSHES):
-            for term in (self.setup.wall, self.setup.wedge):
-                if term not in self.setup.system.terms:
-                    continue
-                distance, normal, _ = term.field.evaluate(result)
-                out = (distance < 0.0) & ~held
-                result[out] -= distance[out, None] * normal[out]
-        return result
-
-    def _blocked(self, state: Floats, move: Floats) -> str | None:
-        # on the finest mesh the resolver sees to it
-        return None if self._is_quick(self.setup) else super()._blocked(state, move)
-
-    def _damped(self, before: Floats, trial: Floats) -> Outcome:
-        if not self._is_quick(self.setup):
-            return super()._damped(before, trial)
-        return self._few_iterations(before, trial, _BOUNDARY_DAMPING)
-
-    def _settle(self, before: Floats, state: Floats) -> Outcome:
-        if not self._is_quick(self.setup):
-            return super()._settle(before, state)
-        self.setup.clamp.renew(self.setup.system.positions(state))
-        return self._few_iterations(before, state, _DAMPING)
 
     def _raise_until_inside(self, state: Floats) -> Floats:
         """Raise the penalties until the cusp is inside wall and wedge (§3.4 step 3)."""

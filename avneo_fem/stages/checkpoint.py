@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 class Checkpoint:
     """Where a cusp stands: the state, what it took, and how many levels are complete.
 
-    ``penalty_stiffness`` is that of wall, wedge and clamp, ``clamp_reference`` the
+    ``penalty_stiffness`` is that of wall, wedge, clamp and layers, ``clamp_reference`` the
     clamp's.
     ``finished`` says that nothing is left to do; then ``residual`` and ``failure`` are those of
     the result.
@@ -33,7 +33,7 @@ class Checkpoint:
     state: Floats
     directors: Floats
     levels_done: int
-    penalty_stiffness: tuple[float, float, float]
+    penalty_stiffness: tuple[float, float, float, float]
     clamp_reference: Floats
     records: list[StageRecord]
     snapshots: list[Snapshot]

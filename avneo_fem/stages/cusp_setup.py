@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from avneo_fem.constraints.clamp_penalty import ClampPenalty
+from avneo_fem.constraints.layer_clearance import LayerClearance
 from avneo_fem.constraints.self_contact import SelfContact
 from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
 from avneo_fem.equilibrium.cusp_system import CuspSystem
@@ -111,6 +112,7 @@ class CuspSetup:
         self.conormal = self.cusp.sutured_conormal(middles)
         self.wall, self.wedge = self._penalties()
         self.clamp = self._clamp()
+        self.layers = self._layers()
         self.row = self._blocked_row()
         self.clamp.active = ~self.row.is_blocked
         membrane = scene.material.young_modulus * self.cusp.thickness
@@ -126,6 +128,7 @@ class CuspSetup:
         other.newton.iterations = self.newton.iterations
         other.wall.stiffness, other.wedge.stiffness = self.wall.stiffness, self.wedge.stiffness
         other.clamp.stiffness = self.clamp.stiffness
+        other.layers.stiffness = self.layers.stiffness
         other.wedge.field = self.wedge.field
         return other
 
@@ -179,6 +182,17 @@ class CuspSetup:
             from_wedge,
         )
         return wall, wedge
+
+    def _layers(self) -> LayerClearance:
+        scene, thickness = self.scene, self.cusp.thickness
+        return LayerClearance(
+            self.mesh,
+            thickness,
+            scene.layer_clearance(thickness),
+            scene.layers_unrestricted(thickness),
+            scene.layers.stiffness,
+            scene.layers.width,
+        )
 
     def _clamp(self) -> ClampPenalty:
         """Holds the triangles at the suture; acts from the stage ``clamped_edge`` on."""

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avneo_fem.constraints.clamp_penalty import ClampPenalty
+from avneo_fem.constraints.layer_clearance import LayerClearance
 from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
 from avneo_fem.equilibrium.directors import clamp_rotation, renew_directors, start_directors
 from avneo_fem.meshing.cusp_mesh import CuspMesh
@@ -34,6 +35,8 @@ __all__ = ["CuspSuturing"]
 
 Floats = NDArray[np.float64]
 Outcome = tuple[Floats | None, str]
+
+_Penalty = SignedDistancePenalty | ClampPenalty | LayerClearance
 
 #: share of the pressure that acts while the edge leaves the template
 _FIRST_PRESSURE = 0.05
@@ -165,10 +168,15 @@ class CuspSuturing:
         setup = self.setup
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         stiffness = checkpoint.penalty_stiffness
-        setup.wall.stiffness, setup.wedge.stiffness, setup.clamp.stiffness = stiffness
+        for term, value in zip(self._penalties(), stiffness, strict=True):
+            term.stiffness = value
         setup.clamp.reference = checkpoint.clamp_reference
         self._set_directors(checkpoint.directors)
         return checkpoint.state
+
+    def _penalties(self) -> tuple[_Penalty, ...]:
+        setup = self.setup
+        return setup.wall, setup.wedge, setup.clamp, setup.layers
 
     def _directors(self) -> Floats:
         model = self.setup.model
@@ -189,12 +197,12 @@ class CuspSuturing:
         if self.store is None:
             return
         setup = self.setup
-        stiffness = (setup.wall.stiffness, setup.wedge.stiffness, setup.clamp.stiffness)
+        wall, wedge, clamp, layers = (term.stiffness for term in self._penalties())
         kept = Checkpoint(
             state=state,
             directors=self._directors(),
             levels_done=done,
-            penalty_stiffness=stiffness,
+            penalty_stiffness=(wall, wedge, clamp, layers),
             clamp_reference=setup.clamp.reference,
             records=self.records,
             snapshots=self.snapshots,
@@ -211,15 +219,17 @@ class CuspSuturing:
         ``parameter`` is where the level starts, or its end when it is behind the state.
         """
         setup, name = self.setup, level.name
+        # a term that asks for nothing is none
+        layers = [setup.layers] if setup.layers.clearance > 0 else []
         if name == "hinged_edge":
             # from here on the cusp must not slip behind its own sutured edge
-            setup.system.terms = [setup.wall]
+            setup.system.terms = [setup.wall, *layers]
         elif name == "clamped_edge":
             setup.system.fix(setup.model.angle_dofs[self._suture_edges(~setup.row.is_blocked)])
-            setup.system.terms = [setup.wall, setup.clamp]
+            setup.system.terms = [setup.wall, *layers, setup.clamp]
         elif name == "contact_wedge":
             clamp = [setup.clamp] if setup.scene.material.bending else []
-            setup.system.terms = [setup.wall, *clamp, setup.wedge]
+            setup.system.terms = [setup.wall, *layers, *clamp, setup.wedge]
             setup.wedge.field = setup.wedges.wedge(setup.index, max(parameter, 0.0))
         elif name == "first_row":
             setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
@@ -430,12 +440,12 @@ class CuspSuturing:
         wall, wedge = self.setup.wall.evaluate(points)[0], self.setup.wedge.evaluate(points)[0]
         return float((-wall).max(initial=0.0)), float((-wedge).max(initial=0.0))
 
-    def shortfalls(self, points: Floats) -> tuple[float, float, float]:
-        """How far wall, wedge and clamp are from what they must hold.
+    def shortfalls(self, points: Floats) -> tuple[float, float, float, float]:
+        """How far wall, wedge, clamp and layers are from what they must hold.
 
         Returns
         -------
-        (wall, wedge, clamp)
+        (wall, wedge, clamp, layers)
             Largest miss of the clearances [mm], sutured nodes apart; within the taper the node
             need only be inside the root. Clamp: rms angle to the half-plane [degrees].
         """
@@ -452,6 +462,7 @@ class CuspSuturing:
             float(wall[free].max(initial=0.0)),
             float(wedge[free].max(initial=0.0)),
             float(np.degrees(clamp)),
+            setup.layers.shortfall(points),
         )
 
     def _raise_until_inside(self, state: Floats) -> Floats:
@@ -459,12 +470,12 @@ class CuspSuturing:
         setup, scene = self.setup, self.setup.scene
         # less than what is judged: the judge also looks between the nodes
         inside = 0.5 * scene.inside_tolerance(setup.cusp.thickness)
-        allowed = (inside, inside, scene.clamp.tolerance_degrees)
-        terms: list[SignedDistancePenalty | ClampPenalty] = [setup.wall, setup.wedge, setup.clamp]
+        allowed = (inside, inside, scene.clamp.tolerance_degrees, inside)
         limits = (
             scene.wall.maximum_stiffness,
             scene.contact.maximum_stiffness,
             scene.clamp.maximum_stiffness,
+            scene.layers.maximum_stiffness,
         )
         while True:
             misses = self.shortfalls(setup.system.positions(state))
@@ -476,7 +487,9 @@ class CuspSuturing:
                     return state
                 continue
             raised = False
-            for term, limit, miss, most in zip(terms, limits, misses, allowed, strict=True):
+            for term, limit, miss, most in zip(
+                self._penalties(), limits, misses, allowed, strict=True
+            ):
                 if miss > most and term.stiffness < limit:
                     # no more than is missing: stiff penalties cost digits
                     factor = min(scene.wall.growth, 1.3 * miss / most)
@@ -489,13 +502,13 @@ class CuspSuturing:
 
     def _what_is_missing(self, state: Floats) -> str:
         setup = self.setup
-        wall, wedge, clamp = self.shortfalls(setup.system.positions(state))
+        wall, wedge, clamp, layers = self.shortfalls(setup.system.positions(state))
         return (
             f"root_wall: short of the clearance by {wall:.3f} mm from the wall and {wedge:.3f} mm"
-            f" from the contact wedge, clamp off by {clamp:.1f} degrees rms, at penalties of"
-            f" {setup.wall.stiffness:g} kPa, {setup.wedge.stiffness:g} kPa and"
-            f" {setup.clamp.stiffness:g} mN; refine mesh.size, or raise maximum_stiffness of wall,"
-            " contact or clamp, or the tolerance"
+            f" from the contact wedge, layers by {layers:.3f} mm, clamp off by {clamp:.1f} degrees"
+            f" rms, at penalties of {setup.wall.stiffness:g} kPa, {setup.wedge.stiffness:g} kPa,"
+            f" {setup.layers.stiffness:g} kPa and {setup.clamp.stiffness:g} mN; refine mesh.size,"
+            " or raise maximum_stiffness of wall, contact, layers or clamp, or the tolerance"
         )
 
     def _converge(self, state: Floats, name: str, tolerance: float) -> Floats:
