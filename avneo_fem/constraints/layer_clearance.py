@@ -14,6 +14,7 @@ from avneo_fem.constraints.pair_distance import (
     pair_distance,
     pair_distance_derivatives,
 )
+from avneo_fem.constraints.term import Foreseen
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 
 __all__ = ["LayerClearance"]
@@ -113,16 +114,22 @@ class LayerClearance:
         nodes, weights, ramp = nodes[acts], weights[acts], ramp[acts]
         if not len(nodes):
             return
-        if is_edges:
-            table, ends = self._edge_areas, nodes.T
-            areas = 0.5 * np.asarray(table[ends[0], ends[1]] + table[ends[2], ends[3]]).ravel()
-        else:
-            areas = self._node_areas[nodes[:, 0]]
-        flat = self._template[nodes]
-        sides = np.square(flat[:, [1, 3]] - flat[:, [0, 2]]).sum(axis=2)
+        areas, rest_squares = self._areas(nodes, is_edges), self._rest_squares(nodes)
         self._acting.append(
-            _Acting(nodes, is_edges, points[nodes], weights, ramp, areas, sides.prod(axis=1))
+            _Acting(nodes, is_edges, points[nodes], weights, ramp, areas, rest_squares)
         )
+
+    def _areas(self, nodes: Ints, is_edges: bool) -> Floats:
+        """(k,) template area that goes with each pair [mm^2]."""
+        if not is_edges:
+            return self._node_areas[nodes[:, 0]]
+        table, ends = self._edge_areas, nodes.T
+        return 0.5 * np.asarray(table[ends[0], ends[1]] + table[ends[2], ends[3]]).ravel()
+
+    def _rest_squares(self, nodes: Ints) -> Floats:
+        """(k,) product of the squared lengths in the template, for edges [mm^4]."""
+        flat = self._template[nodes]
+        return np.square(flat[:, [1, 3]] - flat[:, [0, 2]]).sum(axis=2).prod(axis=1)
 
     def active(self, points: Floats) -> int:
         """Number of pairs that are pushed apart at points (n, 3) [mm]."""
@@ -171,11 +178,40 @@ class LayerClearance:
             if self.project:
                 values, vectors = np.linalg.eigh(blocks)
                 blocks = (vectors * np.maximum(values, 0.0)[:, None]) @ vectors.transpose(0, 2, 1)
-            dofs = (3 * group.nodes[:, :, None] + np.arange(3)).reshape(-1, 12)
-            rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
-            entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
-            total = total + sp.coo_matrix(entries, shape=(size, size)).tocsr()
+            total = total + _scattered(blocks, group.nodes, size)
         return total
+
+    def foreseen(self, points: Floats, moves: Floats) -> Foreseen:
+        """What changes when the pairs that act are those that act after ``moves`` (n, 3).
+
+        The Hessian added is that of the linearised distances, without their curvature.
+        """
+        gradient, size = np.zeros(points.shape), points.size
+        total, switches = sp.csr_matrix((size, size)), []
+        for nodes, is_edges in zip(self._layers.at(points), (False, True), strict=True):
+            if not len(nodes):
+                continue
+            distance, weights = pair_distance(points[nodes], is_edges)
+            offset = np.einsum("kn,knd->kd", weights, points[nodes])
+            slope = np.einsum("kn,kd->knd", weights, offset / distance[:, None])
+            ramp = 1.0 - 2.0 * (distance - self.clearance) / self.width
+            ahead = ramp - 2.0 / self.width * np.einsum("knd,knd->k", slope, moves[nodes])
+            switched = (ahead > 0).astype(int) - (ramp > 0)
+            switches.append(switched)
+            rows = np.flatnonzero(switched)
+            if not len(rows):
+                continue
+            nodes, slope = nodes[rows], slope[rows]
+            load = self.stiffness * self._areas(nodes, is_edges) * switched[rows]
+            if is_edges:
+                corners = points[nodes]
+                load = load * edge_mollifier(corners, self._rest_squares(nodes))[0]
+            np.add.at(gradient, nodes, -(load * ramp[rows])[:, None, None] * slope)
+            flat = slope.reshape(-1, 12)
+            blocks = (2.0 / self.width * load)[:, None, None] * flat[:, :, None] * flat[:, None, :]
+            total = total + _scattered(blocks, nodes, size)
+        none = np.zeros(0, dtype=int)
+        return Foreseen(np.concatenate([none, *switches]), gradient, total)
 
     def _blocks(self, group: _Acting) -> Floats:
         """(k, 12, 12) second derivatives of the pairs [mN/mm]."""
@@ -192,3 +228,11 @@ class LayerClearance:
         blocks *= factor[:, None, None]
         blocks += force[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
         return blocks + held[:, None, None] * second
+
+
+def _scattered(blocks: Floats, nodes: Ints, size: int) -> sp.csr_matrix:
+    """(size, size) matrix of blocks (k, 12, 12) at the coordinates of nodes (k, 4)."""
+    dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 12)
+    rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
+    entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
+    return sp.coo_matrix(entries, shape=(size, size)).tocsr()

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from avneo_fem.constraints.term import block_diagonal
+from avneo_fem.constraints.term import Foreseen, block_diagonal
 
 __all__ = ["SignedDistance", "SignedDistancePenalty"]
 
@@ -99,20 +99,11 @@ class SignedDistancePenalty:
         blocks = rate[:, None, None] * normal[:, :, None] * normal[:, None, :]
         return block_diagonal(blocks - (load * ramp)[:, None, None] * curvature)
 
-    def foreseen(self, points: Floats, moves: Floats) -> tuple[Floats, Floats, Floats]:
+    def foreseen(self, points: Floats, moves: Floats) -> Foreseen:
         """What changes when the nodes that act are those that act after ``moves`` (n, 3).
 
         A node on its way into the ramp is not in :meth:`hessian`, one on its way out still is; a
         Newton step that knows neither runs into the ramp and is cut short. Linearised distance.
-
-        Returns
-        -------
-        switched : (n,) int array
-            1 where a node begins to act, -1 where it ceases to.
-        gradient : (n, 3) array
-            To be added to :meth:`gradient` [mN].
-        blocks : (n, 3, 3) array
-            To be added to :meth:`hessian` [mN/mm].
         """
         distance, normal, _ = self.evaluate(points)
         ramp = 1.0 - 2.0 * (distance - self.clearance) / self.width
@@ -120,4 +111,4 @@ class SignedDistancePenalty:
         switched = (ahead > 0).astype(int) - (ramp > 0)
         load = self.stiffness * self.node_areas * switched
         blocks = (2.0 / self.width * load)[:, None, None] * normal[:, :, None] * normal[:, None, :]
-        return switched, -(load * ramp)[:, None] * normal, blocks
+        return Foreseen(switched, -(load * ramp)[:, None] * normal, block_diagonal(blocks))

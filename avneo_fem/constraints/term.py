@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-__all__ = ["Term", "block_diagonal"]
+__all__ = ["Foreseeing", "Foreseen", "Term", "block_diagonal"]
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +25,33 @@ class Term(Protocol):
 
     def hessian(self, points: Floats) -> sp.spmatrix:
         """(3n, 3n) second derivative [mN/mm]."""
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """What changes in a term when what acts is what acts after a step.
+
+    Attributes
+    ----------
+    switched : (k,) int array
+        For each thing that can act: 1 where it begins to, -1 where it ceases to, else 0.
+    gradient : (n, 3) array
+        To be added to the term's gradient [mN].
+    hessian : (3n, 3n) sparse matrix
+        To be added to the term's Hessian [mN/mm].
+    """
+
+    switched: NDArray[np.int_]
+    gradient: Floats
+    hessian: sp.spmatrix
+
+
+@runtime_checkable
+class Foreseeing(Protocol):
+    """A term that acts in places only, and can tell where it will after a step."""
+
+    def foreseen(self, points: Floats, moves: Floats) -> Foreseen:
+        """Change at positions (n, 3) when ``moves`` (n, 3) are taken; linearised distances."""
 
 
 def block_diagonal(blocks: Floats) -> sp.bsr_matrix:

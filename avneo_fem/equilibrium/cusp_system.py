@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from avneo_fem.constraints.self_contact import SelfContact
-from avneo_fem.constraints.term import Term, block_diagonal
+from avneo_fem.constraints.term import Foreseeing, Foreseen, Term
 from avneo_fem.equilibrium.shell_model import ShellModel
 
 __all__ = ["CuspSystem"]
@@ -118,17 +118,15 @@ class CuspSystem:
         dead = 0.0 if self.dead_load is None else float(self.dead_load @ state)
         return self.model.energy(state) - dead + sum(t.energy(points) for t in self._active(extra))
 
-    def foreseen(
-        self, state: Floats, step: Floats
-    ) -> tuple[NDArray[np.int_], Floats, sp.csr_matrix] | None:
-        """Change of residual and tangent when ``step`` (size,) is taken, as far as penalties
-        foresee it (``SignedDistancePenalty.foreseen``); None without such terms."""
+    def foreseen(self, state: Floats, step: Floats) -> Foreseen | None:
+        """Change of residual and tangent when ``step`` (size,) is taken, as far as terms foresee
+        it; arrays are (size,) and (size, size). None without such terms."""
         points, moves = self.positions(state), self.positions(step)
-        found = [t.foreseen(points, moves) for t in self.terms if hasattr(t, "foreseen")]
+        found = [t.foreseen(points, moves) for t in self.terms if isinstance(t, Foreseeing)]
         if not found:
             return None
         residual = np.zeros(self.model.size)
-        residual[self.model.position_dofs] = sum(gradient for _, gradient, _ in found)
-        blocks = block_diagonal(sum(block for _, _, block in found))
-        tangent = (self._expand @ blocks.tocsr() @ self._expand.T).tocsr()
-        return np.concatenate([switched for switched, _, _ in found]), residual, tangent
+        residual[self.model.position_dofs] = sum(part.gradient for part in found)
+        total = sum((part.hessian.tocsr() for part in found[1:]), found[0].hessian.tocsr())
+        tangent = (self._expand @ total @ self._expand.T).tocsr()
+        return Foreseen(np.concatenate([part.switched for part in found]), residual, tangent)

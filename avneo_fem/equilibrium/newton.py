@@ -9,6 +9,7 @@ collision, so that every trial state of the line search is free of crossings too
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ __all__ = ["NewtonSettings", "NewtonSolver", "Verdict"]
 Floats = NDArray[np.float64]
 
 #: times at most that a direction is corrected for penalties it switches on or off
-_FORESIGHT = 4
+_FORESIGHT = 2
 #: a step is short below this share of what was asked; bt often takes exactly 1/2 or 1/4, which
 #: rounding must not decide on
 _SHORT = 0.4
@@ -80,6 +81,8 @@ class NewtonSolver:
         self.system, self.settings = system, settings
         self.symmetric = Factorization(symmetric=True)
         self.general = Factorization(symmetric=False)
+        # of its own, as its patterns differ: that of the tangent need not be analysed again
+        self.ahead = Factorization(symmetric=True)
         self.iterations, self.hindered, self.looks = 0, 0, 0
         self.forget()
         self._base: Floats = np.empty(0)
@@ -173,15 +176,14 @@ class NewtonSolver:
             found = self.system.foreseen(self._base, step)
             if found is None:
                 return direction
-            switched, residual, tangent = found
-            if not switched.any() if last is None else np.array_equal(switched, last):
+            if np.array_equal(found.switched, last if last is not None else 0 * found.switched):
                 return direction
-            last = switched
+            last = found.switched
             self.looks += 1
             with suppress(FactorizationError):
-                if self.symmetric.factorize(matrix + tangent[self._free][:, self._free]):
+                if self.ahead.factorize(matrix + found.hessian[self._free][:, self._free]):
                     return direction
-                better = self.symmetric.solve(force + residual[self._free])
+                better = self.ahead.solve(force + found.gradient[self._free])
                 if not np.isfinite(better).all() or better @ force <= 0:
                     return direction
                 direction = better
@@ -253,17 +255,24 @@ class NewtonSolver:
         x.array[:] = state[self._free]
         snes = self._make_snes(size, maximum_iterations or self.settings.maximum_iterations)
         try:
-            snes.solve(None, x)
-            reason = snes.getConvergedReason()
-        except (PETSc.Error, FactorizationError):
-            reason = -3
-        iterations = snes.getIterationNumber()
+            try:
+                snes.solve(None, x)
+                reason = snes.getConvergedReason()
+            except (PETSc.Error, FactorizationError):
+                reason = -3
+            except BaseException as error:
+                # frames of the callbacks hold PETSc objects, which crash when they outlive PETSc
+                error.add_note(traceback.format_exc())
+                raise error.with_traceback(None) from None
+            iterations = snes.getIterationNumber()
+            result = self._full(x)
+        finally:
+            # left to PETSc's own clean-up at exit, a SNES with Python parts takes it down
+            snes.destroy()
+            for held in (*self._work, x):
+                held.destroy()
         self.iterations += iterations
-        result = self._full(x)
         residual = float(np.linalg.norm(system.residual(result, extra)[self._free]) / self._scale)
-        snes.destroy()
-        for held in (*self._work, x):
-            held.destroy()
         text = _REASONS.get(reason, f"SNES reason {reason}")
         seconds = time.perf_counter() - clock
         return result, Verdict(residual <= tolerance, text, iterations, residual, seconds)

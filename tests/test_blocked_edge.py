@@ -1,0 +1,272 @@
+"""Sutured edges that lead into the neighbour, against rays, closed forms and a collision test."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from typing import Any
+
+import ipctk
+import numpy as np
+import pytest
+
+from avneo_fem.constraints.contact_pairs import collision_mesh
+from avneo_fem.geometry.valve_input import ValveInput
+from avneo_fem.meshing.refine import nested_meshes
+from avneo_fem.scene import parse_scene
+from avneo_fem.stages.blocked_edge import LaidRow
+from avneo_fem.stages.cusp_setup import CuspSetup
+from valve_cases import DEMOS
+
+THICKNESS, RADIUS = 0.5, 12.0
+#: 0.4 of inside_tolerance, which is 1 % of the thickness
+SLACK = 0.002
+#: edge lengths and refinements
+MESHES = ((3.0, 0), (2.0, 0), (1.4, 1))
+
+
+@cache
+def made(size: float = 2.0, refinements: int = 0, number: int = 1, index: int = 0, **changes: Any):  # noqa: ANN201
+    """Set-up of a cusp of a demo, which has a commissural gap of 0.5 mm unless told otherwise."""
+    data = tomllib.loads((DEMOS / f"experiment_{number}.toml").read_text())
+    data["mesh"]["size"] = size
+    data["commissures"]["gap"] = changes.get("gap", 0.5)
+    if "method" in changes:
+        data["contact"] = {"method": changes["method"]}
+    given = ValveInput.from_scene(parse_scene(data))
+    mesh = nested_meshes(given.geometry.cusps[index].template, size, refinements, False)[-1]
+    return CuspSetup(given.scene, given.geometry, given.wedges, index, mesh)
+
+
+def laid(setup: CuspSetup) -> np.ndarray:
+    """All nodes: sutured ones and the row in their places."""
+    points, row = setup.start.copy(), setup.row
+    points[setup.mesh.suture_line] = setup.target
+    points[row.nodes] = row.on_the_way(points[row.nodes], 1.0)
+    return points
+
+
+def frames(setup: CuspSetup) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of every sutured triangle: share of the edge at which it has its height, height, length of
+    the edge in place, and unit vector along -b, made orthogonal to the edge."""
+    mesh, line = setup.mesh, setup.mesh.suture_line
+    start, stop = mesh.points[line[:-1]], mesh.points[line[1:]]
+    arm, side = mesh.points[setup.clamp.apex] - start, stop - start
+    length = np.hypot(*side.T)
+    height = np.abs(side[:, 0] * arm[:, 1] - side[:, 1] * arm[:, 0]) / length
+    share = np.einsum("kd,kd->k", arm, side) / length**2
+    along = np.diff(setup.target, axis=0)
+    inward = -np.cross(along, np.cross(setup.conormal, along))
+    return share, height, along, inward / np.linalg.norm(inward, axis=1)[:, None]
+
+
+@pytest.mark.parametrize(("size", "refinements"), MESHES)
+@pytest.mark.parametrize("gap", [0.3, 0.5, 1.0])
+def test_blocked_where_the_half_plane_runs_into_the_wedge(
+    size: float, refinements: int, gap: float
+) -> None:
+    """Truth: a ray from every suture edge into its half-plane, looked at in steps of 1/4000 of the
+    triangle's height: it is blocked when the ray comes nearer to the closed wedge than its
+    clearance, less 0.4 of the tolerance, before half the height. Those are edges next to the
+    commissures, as many at both ends."""
+    setup = made(size, refinements, gap=gap)
+    share, height, along, inward = frames(setup)
+    apex, mesh = setup.clamp.apex, setup.mesh
+    foot = setup.target[:-1] + np.clip(share, 0, 1)[:, None] * along
+    steps = np.linspace(0.0, 1.0, 2001)[1:] * 0.5
+    samples = foot[:, None] + (steps * height[:, None])[..., None] * inward[:, None]
+    # the free edge's node stands higher, which a wedge along the axis does not notice
+    distance = setup.wedges.wedge(0, 1.0).signed_distance(samples.reshape(-1, 3))
+    needed = setup.wedge.clearance[apex][:, None] - SLACK
+    runs_in = (distance.reshape(len(apex), -1) < needed).any(axis=1)
+    runs_in &= ~np.isin(apex, mesh.suture_line)
+    blocked = setup.row.is_blocked
+    np.testing.assert_array_equal(blocked, np.isin(apex, apex[runs_in]))
+    assert blocked[[0, -1]].all()
+    first, last = np.argmin(blocked), np.argmin(blocked[::-1])
+    assert first == last
+    assert not blocked[first : len(blocked) - last].any()
+    np.testing.assert_array_equal(np.sort(setup.row.nodes), np.unique(apex[blocked]))
+    assert not np.isin(setup.row.nodes, mesh.suture_line).any()
+    np.testing.assert_array_equal(setup.clamp.active, ~blocked)
+
+
+@pytest.mark.parametrize(("size", "refinements"), MESHES)
+def test_equal_counts_at_both_ends(size: float, refinements: int) -> None:
+    """Truth: cusp and suture line are their own mirror images: as many nodes at either end, and
+    the edge next to the free edge among them."""
+    setup = made(size, refinements)
+    blocked = np.flatnonzero(setup.row.is_blocked)
+    count = len(setup.row.is_blocked)
+    np.testing.assert_array_equal(blocked, np.sort(count - 1 - blocked))
+    ends = setup.clamp.apex[setup.row.is_blocked][[0, -1]]
+    np.testing.assert_array_equal(np.sort(ends), np.sort(setup.mesh.free_edge[[1, -2]]))
+
+
+@pytest.mark.parametrize("gap", [0.5, 0.6, 0.8])
+def test_reach_in_closed_form(gap: float) -> None:
+    """Truth: symmetry planes go through the axis, and the first 2.5 mm of the suture line go down:
+    a ray along the wall's tangent has the distance R sin d - t cos d, d = gap/2R, and so t at most
+    (R sin d - H/2 + slack) / cos d; the reach is that, less at most 1/40 of the triangle's height,
+    and no less than the slack."""
+    setup = made(gap=gap, method="symmetry_planes")
+    row = setup.row
+    straight = np.isclose(np.abs(row.tangent[:, 2]), 1.0, atol=1e-12)
+    straight &= setup.wedge.clearance[row.nodes] > THICKNESS / 2 - 1e-6
+    assert np.count_nonzero(straight) >= 2
+    turn = gap / 2 / RADIUS
+    longest = (RADIUS * np.sin(turn) - THICKNESS / 2 + SLACK) / np.cos(turn)
+    height = np.array([frames(setup)[1][setup.clamp.apex == n].max() for n in row.nodes[straight]])
+    reach = row.reach[straight]
+    assert (reach <= max(longest, SLACK) + 1e-9).all()
+    assert (reach >= np.maximum(longest - height / 40, SLACK) - 1e-9).all()
+    assert (reach >= SLACK).all()
+
+
+@pytest.mark.parametrize(("number", "index"), [(1, 0), (2, 0), (2, 2), (3, 1)])
+@pytest.mark.parametrize("gap", [0.0, 0.5, 1.0])
+def test_places(number: int, index: int, gap: float) -> None:
+    """Truth: each place lies in the half-plane of a suture edge that the node belongs to, above
+    the edge (the free edge's node: above the corner), at its reach; it keeps its clearance from
+    the closed wedge less the slack, or where the edge itself has less, that less the slack."""
+    setup = made(2.0, 0, number, index, gap=gap)
+    row, wedge = setup.row, setup.wedges.wedge(index, 1.0)
+    places = laid(setup)[row.nodes]
+    _, _, along, inward = frames(setup)
+    on_free_edge = np.isin(row.nodes, setup.mesh.free_edge)
+    assert len(places) >= 4
+    for j, node in enumerate(row.nodes):
+        own = np.flatnonzero(setup.clamp.apex == node)
+        edge = own[np.argmin(np.abs(inward[own] - row.inward[j]).max(axis=1))]
+        np.testing.assert_allclose(row.inward[j], inward[edge], atol=1e-12)
+        length = np.linalg.norm(along[edge])
+        np.testing.assert_allclose(row.tangent[j], along[edge] / length, atol=1e-12)
+        arm = places[j] - setup.target[edge]
+        assert arm @ np.cross(along[edge] / length, inward[edge]) == pytest.approx(0, abs=1e-12)
+        assert arm @ inward[edge] == pytest.approx(row.reach[j], abs=1e-12)
+        if not on_free_edge[j]:
+            assert -1e-12 <= arm @ along[edge] / length <= length + 1e-12
+    at_foot = wedge.signed_distance(row.foot)
+    kept = np.minimum(setup.wedge.clearance[row.nodes], at_foot) - SLACK
+    assert (wedge.signed_distance(places) - kept).min() > -1e-12
+    assert (row.reach >= SLACK).all()
+
+
+@pytest.mark.parametrize(
+    ("number", "index", "size", "refinements"),
+    [(1, 0, 3.0, 0), (1, 0, 2.0, 0), (1, 0, 1.4, 1), (2, 0, 2.0, 0), (2, 2, 1.4, 1), (3, 1, 1.4, 0)],
+)
+@pytest.mark.parametrize("gap", [0.0, 0.5, 1.0])
+def test_no_crossings(number: int, index: int, size: float, refinements: int, gap: float) -> None:
+    """Truth: ipctk finds no crossing among the triangles that the row and the sutured edge hold;
+    none is degenerate, and none is turned inside out: seen along the suture line's wall they have
+    one orientation."""
+    setup = made(size, refinements, number, index, gap=gap)
+    points, row = laid(setup), setup.row
+    held = np.r_[setup.mesh.suture_line, row.nodes]
+    cells = setup.mesh.triangles[np.isin(setup.mesh.triangles, held).all(axis=1)]
+    assert len(cells) >= np.count_nonzero(row.is_blocked)
+    used, local = np.unique(cells, return_inverse=True)
+    mesh = collision_mesh(points[used], local.reshape(-1, 3))
+    assert not ipctk.has_intersections(mesh, np.asfortranarray(points[used]))
+    corners = points[cells]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    radial = corners.mean(axis=1) * [1.0, 1.0, 0.0]
+    side = np.einsum("kd,kd->k", normal, radial)
+    assert np.abs(side).min() > 0
+    assert len(set(np.sign(side))) == 1
+
+
+@pytest.mark.parametrize(("number", "index"), [(1, 0), (2, 0), (3, 2)])
+def test_free_edge_keeps_its_height(number: int, index: int) -> None:
+    """Truth: (1.6) wants the free edge above the plane of commissures what it is above its corners
+    in the template, H_f (1 - 2|x|/L_f); a laid node of the free edge is just there."""
+    setup = made(2.0, 0, number, index)
+    row, plane = setup.row, setup.geometry.commissures
+    on_free_edge = np.isin(row.nodes, setup.mesh.free_edge)
+    assert np.count_nonzero(on_free_edge) == 2
+    p = setup.cusp.template.parameters
+    x = setup.mesh.points[row.nodes[on_free_edge], 0]
+    wanted = p.free_edge_height * (1 - 2 * np.abs(x) / p.free_edge_length)
+    places = laid(setup)[row.nodes[on_free_edge]]
+    np.testing.assert_allclose((places - plane.points[0]) @ plane.normal, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(("size", "refinements"), MESHES)
+def test_nothing_is_blocked_by_a_wide_gap(size: float, refinements: int) -> None:
+    """Truth: with 6 mm between neighbours there are 2.7 mm of room for every triangle of at most
+    3 mm, more than half its height: nothing is blocked, nothing held, every edge clamped."""
+    setup = made(size, refinements, gap=6.0)
+    row = setup.row
+    assert not row.is_blocked.any()
+    assert len(row.is_blocked) == len(setup.mesh.suture_edges)
+    assert setup.clamp.active.all()
+    assert len(row.nodes) == len(row.reach) == 0
+    assert row.on_the_way(np.empty((0, 3)), 0.5).shape == (0, 3)
+
+
+@pytest.fixture
+def row() -> LaidRow:
+    """Three nodes with random frames."""
+    random = np.random.default_rng(11)
+    frame = np.linalg.qr(random.standard_normal((3, 3, 3)))[0]
+    tangent, inward = frame[:, 0], frame[:, 1]
+    normal = np.cross(tangent, -inward)
+    foot, reach = random.standard_normal((3, 3)), np.array([0.002, 0.1, 0.3])
+    return LaidRow(np.arange(3), foot, tangent, inward, normal, reach, np.ones(3, dtype=bool))
+
+
+def placed(row: LaidRow, radius: np.ndarray, angle: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Points given by cylinder coordinates about the suture line."""
+    across = np.cos(angle)[:, None] * row.inward + np.sin(angle)[:, None] * row.normal
+    return row.foot + radius[:, None] * across + rest[:, None] * row.tangent
+
+
+ANGLES = np.array([[0.2, -1.1, 2.9], [-3.0, 0.0, 1.6]])
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_both_ends_of_the_way(row: LaidRow, angle: np.ndarray) -> None:
+    """Truth: share 0 is the start, share 1 the place: at the reach, along -b from the foot."""
+    start = placed(row, np.array([0.8, 1.2, 0.5]), angle, np.array([0.3, -0.4, 0.0]))
+    np.testing.assert_allclose(row.on_the_way(start, 0.0), start, atol=1e-14)
+    place = row.foot + row.reach[:, None] * row.inward
+    np.testing.assert_allclose(row.on_the_way(start, 1.0), place, atol=1e-14)
+    np.testing.assert_allclose(row.on_the_way(place, 0.4), place, atol=1e-14)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_half_way(row: LaidRow, angle: np.ndarray) -> None:
+    """Truth: cylinder coordinates about the suture line: half the angle, half the offset along it,
+    the geometric mean of the distances."""
+    radius, rest = np.array([0.8, 1.2, 0.5]), np.array([0.3, -0.4, 0.0])
+    found = row.on_the_way(placed(row, radius, angle, rest), 0.5)
+    expected = placed(row, np.sqrt(radius * row.reach), angle / 2, rest / 2)
+    np.testing.assert_allclose(found, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_the_way_closes_in(row: LaidRow, angle: np.ndarray) -> None:
+    """Truth: distance from the line, angle and offset fall all the way, none changes its sign; no
+    node ever touches the line."""
+    start = placed(row, np.array([0.8, 1.2, 0.5]), angle, np.array([0.3, -0.4, 0.1]))
+    seen = []
+    for share in np.linspace(0.0, 1.0, 21):
+        arm = row.on_the_way(start, share) - row.foot
+        x, y, z = (np.einsum("jd,jd->j", arm, a) for a in (row.inward, row.normal, row.tangent))
+        seen.append((np.hypot(x, y), np.arctan2(y, x), z))
+    radius, turn, rest = np.array(seen).transpose(1, 0, 2)
+    assert (np.diff(radius, axis=0) < 0).all()
+    assert (radius >= row.reach - 1e-14).all()
+    for part in (turn, rest):
+        assert (np.diff(np.abs(part), axis=0) <= 1e-14).all()
+        assert (part * part[0] >= -1e-14).all()
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_steps_of_the_way_add_up(row: LaidRow, angle: np.ndarray) -> None:
+    """Truth: a share of the way and a share of the rest lead where both together do; so halved
+    steps of a level end in the same places."""
+    start = placed(row, np.array([0.8, 1.2, 0.5]), angle, np.array([0.3, -0.4, 0.1]))
+    found = row.on_the_way(row.on_the_way(start, 0.3), 0.4)
+    np.testing.assert_allclose(found, row.on_the_way(start, 1 - 0.7 * 0.6), atol=1e-14)
