@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.scene import load_scene, parse_scene
 from avneo_fem.stages.record import CuspResult, Snapshot, StageRecord
-from avneo_fem.valve.congruence import representatives, rotate_result
+from avneo_fem.valve.congruence import representatives, rotate_result, to_its_place
 from run_cases import SMALL, Run
 from valve_cases import DEMOS
 
@@ -94,6 +95,49 @@ def test_rotated_result(copy: int) -> None:
     assert found.snapshots[0].fields is fields
     assert source.index == 0
     assert source.copied_from is None
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_to_its_place(number: int, index: int) -> None:
+    """Truth: nodes on the suture line that a cusp sees as its own, as cusp 0, come to lie on the
+    true one; all distances to wall and wedge stay, also with unequal chords; everything but the
+    positions is as it was, and the cusp was not copied."""
+    given = ValveInput.from_scene(load_scene(DEMOS / f"experiment_{number}.toml"))
+    own = given.seen_from(index)
+    mesh = triangulate_template(own.geometry.cusps[0].template, 3.0)
+    arc = mesh.suture_arc_length
+    points = np.random.default_rng(1).uniform(-8, 8, (len(mesh.points), 3))
+    points[mesh.suture_line] = own.geometry.cusps[0].sutured_position(arc)
+    fields = {"wall_distance": np.arange(len(points)) * 1.0}
+    records = [StageRecord("placement", 0.0, 0, "placed", 1.0, 0.1)]
+    shots = [Snapshot("placement", 0.0, points - 1.0, fields), Snapshot("x", 1.0, points, fields)]
+    source = CuspResult(index, mesh, points, records, shots, 1e-9, 77, None, 5.0, 9.0)
+    found = to_its_place(own.geometry, given.geometry, source)
+    true = given.geometry.cusps[index]
+    np.testing.assert_allclose(
+        found.points[mesh.suture_line], true.sutured_position(arc), rtol=0, atol=1e-12
+    )
+    np.testing.assert_allclose(pdist(found.points), pdist(points), rtol=1e-12)
+    np.testing.assert_array_equal(found.points[:, 2], points[:, 2])
+    for lam in (0.0, 0.5, 1.0):
+        np.testing.assert_allclose(
+            given.wedges.wedge(index, lam).evaluate(found.points)[0],
+            own.wedges.wedge(0, lam).evaluate(points)[0],
+            atol=1e-9,
+        )
+    wall = [
+        g.root.evaluate(p)[0] for g, p in ((given.geometry, found.points), (own.geometry, points))
+    ]
+    np.testing.assert_allclose(*wall, atol=1e-12)
+    assert (found.index, found.copied_from) == (index, None)
+    assert (found.residual, found.dofs, found.failure) == (1e-9, 77, None)
+    assert (found.compile_seconds, found.seconds) == (5.0, 9.0)
+    assert found.mesh is mesh
+    assert found.records is records
+    np.testing.assert_array_equal(found.snapshots[1].points, found.points)
+    np.testing.assert_allclose(pdist(found.snapshots[0].points), pdist(points), rtol=1e-12)
+    assert found.snapshots[0].fields is fields
 
 
 def test_turning_equals_solving(small_run: Run, small_run_of_all: Run) -> None:

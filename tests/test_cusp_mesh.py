@@ -99,3 +99,26 @@ def test_distance_to_suture_by_brute_force(name: str) -> None:
     assert np.all(gaps <= np.hypot(exact, spacing / 2) + 1e-12)
     assert np.all(exact[mesh.suture_line] < 1e-12)
     assert np.count_nonzero(exact < 1e-9) == len(mesh.suture_line)
+
+
+def test_edges_between_by_hand() -> None:
+    """Truth: the rectangle's edges, numbered on paper, along chains in either direction and across;
+    a single node has none."""
+    assert SQUARE.edges_between(np.array([0, 1, 2, 3, 0])).tolist() == [0, 3, 4, 2]
+    assert SQUARE.edges_between(np.array([3, 2, 0])).tolist() == [4, 1]
+    assert SQUARE.edges_between(np.array([2])).tolist() == []
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_edges_between(name: str) -> None:
+    """Truth: the edge with just these two ends, for the free edge, for it backwards, and for the
+    two sides of every edge; along the free edge each has one triangle."""
+    mesh = mesh_of(name, 2.0)
+    found = mesh.edges_between(mesh.free_edge)
+    pairs = [sorted(pair) for pair in pairwise(mesh.free_edge.tolist())]
+    assert mesh.edges[found].tolist() == pairs
+    assert (mesh.edge_cells[found, 1] < 0).all()
+    np.testing.assert_array_equal(mesh.edges_between(mesh.free_edge[::-1]), found[::-1])
+    for number, edge in enumerate(mesh.edges):
+        assert mesh.edges_between(edge).tolist() == [number]
+        assert mesh.edges_between(edge[::-1]).tolist() == [number]

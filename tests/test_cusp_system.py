@@ -149,3 +149,35 @@ def test_relative_residual() -> None:
     assert system.relative_residual(state) == pytest.approx(expected)
     system.terms.clear()
     assert system.relative_residual(state) != pytest.approx(expected)
+
+
+@pytest.mark.parametrize("bending", BENDING)
+def test_foreseen_is_the_sum_over_the_terms(bending: bool) -> None:
+    """Truth: None while no term can tell; then the sum of what each foresees at the entries of the
+    positions, nothing at the angles, and what switches one term after the other."""
+    system, damping = system_with_terms(bending)
+    model, random = system.model, np.random.default_rng(4)
+    state, step = rough(model, 4), random.uniform(-1.0, 1.0, model.size)
+    count = len(model.mesh.points)
+    areas = model.mesh.node_areas
+    one, other = (
+        SignedDistancePenalty(Ball(), areas, 9.0 * width, width, np.full(count, 0.1))
+        for width in (1.0, 0.5)
+    )
+    system.terms = [damping]
+    assert system.foreseen(state, step) is None
+    for chosen in ([one], [one, damping, other]):
+        system.terms = chosen
+        found = system.foreseen(state, step)
+        x, moves = state[model.position_dofs], step[model.position_dofs]
+        parts = [term.foreseen(x, moves) for term in chosen if term is not damping]
+        np.testing.assert_array_equal(
+            found.switched, np.concatenate([part.switched for part in parts])
+        )
+        gradient, hessian = np.zeros(model.size), np.zeros((model.size, model.size))
+        gradient[model.position_dofs] = sum(part.gradient for part in parts)
+        places = model.position_dofs.ravel()
+        hessian[np.ix_(places, places)] = sum(part.hessian.toarray() for part in parts)
+        assert gradient.any()
+        np.testing.assert_array_equal(found.gradient, gradient)
+        np.testing.assert_array_equal(found.hessian.toarray(), hessian)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -30,9 +31,10 @@ class Polygon:
 def polygon() -> Polygon:
     """A pentagon whose free edge has an apex."""
     corners = [(-5.0, 4.0), (-4.0, -1.0), (4.5, -2.0), (5.0, 4.0)]
-    suture = [Line(a, b) for a, b in zip(corners[:-1], corners[1:], strict=True)]
+    suture = [Line(a, b) for a, b in pairwise(corners)]
     return Polygon(
-        PlanarPath(suture), PlanarPath([Line(corners[0], (0.0, 5.0)), Line((0.0, 5.0), corners[-1])])
+        PlanarPath(suture),
+        PlanarPath([Line(corners[0], (0.0, 5.0)), Line((0.0, 5.0), corners[-1])]),
     )
 
 
@@ -151,7 +153,9 @@ def test_straight_edges_are_split_exactly() -> None:
     centre = fine.points[fine.triangles].mean(axis=1).reshape(4, -1, 2)
     corners = mesh.points[mesh.triangles]
     for vertex in range(3):
-        expected = (4 * corners[:, vertex] + np.roll(corners, -vertex, axis=1)[:, 1:].sum(axis=1)) / 6
+        expected = (
+            4 * corners[:, vertex] + np.roll(corners, -vertex, axis=1)[:, 1:].sum(axis=1)
+        ) / 6
         np.testing.assert_allclose(centre[vertex], expected, atol=1e-12)
     np.testing.assert_allclose(centre[3], corners.mean(axis=1), atol=1e-12)
 
@@ -207,7 +211,7 @@ def test_nested_meshes(name: str, refinements: int) -> None:
         assert lengths.mean() == pytest.approx(wanted, rel=0.15)
     first = triangulate_template(template, size * 2.0**refinements)
     np.testing.assert_array_equal(meshes[0].points, first.points)
-    for coarse, fine in zip(meshes[:-1], meshes[1:], strict=True):
+    for coarse, fine in pairwise(meshes):
         expected = refine(coarse, template)
         np.testing.assert_array_equal(fine.points, expected.points)
         np.testing.assert_array_equal(fine.triangles, expected.triangles)
@@ -227,7 +231,7 @@ def test_nested_meshes_of_a_small_template() -> None:
         else:
             with pytest.raises(SceneError, match="too large") as caught:
                 nested_meshes(template, 2.5, refinements, fewer_will_do=False)
-            assert caught.value.key == "mesh.size"
+            assert caught.value.key == "mesh.refinements"
     for fewer_will_do in (True, False):
         with pytest.raises(SceneError, match="too large"):
             nested_meshes(template, 40.0, 2, fewer_will_do)

@@ -64,5 +64,5 @@ def test_no_such_entry(path: tuple[str | int, ...]) -> None:
 def test_known_keys() -> None:
     """Truth: the keys of the tables, sorted."""
     assert known_keys(("cusp", 1)) == ["suture_line", "template"]
-    assert known_keys(("mesh",)) == ["size"]
+    assert known_keys(("mesh",)) == ["refinements", "size"]
     assert {"cusp", "template", "suture_line", "root", "name"} <= set(known_keys(()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 import pytest
@@ -148,3 +149,131 @@ def test_a_replaced_field_is_asked_again() -> None:
     points[0, 2] = 12.0  # the same array, changed in place
     assert penalty.evaluate(points)[0].tolist() == [2.0]
     assert (first.calls, second.calls) == (1, 2)
+
+
+class Chain:
+    """Nodes tied to each other by springs and to their rest by weaker ones, over the floor z = 0.
+
+    The energy is piecewise quadratic: a ramp acts on those nodes that are low enough.
+    """
+
+    def __init__(self, seed: int, count: int = 5) -> None:
+        random = np.random.default_rng(seed)
+        ties = np.diff(np.eye(count), axis=0)
+        springs = np.diag(random.uniform(1.0, 3.0, count)) + 2.0 * ties.T @ ties
+        self.matrix = np.kron(springs, np.eye(3))
+        self.rest = random.uniform(-1.5, 1.5, (count, 3))
+        self.penalty = SignedDistancePenalty(
+            HalfSpace(0.0), random.uniform(0.5, 2.0, count), 8.0, 0.5, np.full(count, 0.1)
+        )
+        self.start = random.uniform(-1.0, 1.0, (count, 3))
+
+    def residual(self, points: np.ndarray) -> np.ndarray:
+        force = self.matrix @ (points - self.rest).ravel()
+        return force + self.penalty.gradient(points).ravel()
+
+    def tangent(self, points: np.ndarray) -> np.ndarray:
+        return self.matrix + self.penalty.hessian(points).toarray()
+
+    def plain_step(self) -> np.ndarray:
+        """Newton's step from the start."""
+        step = np.linalg.solve(self.tangent(self.start), -self.residual(self.start))
+        return step.reshape(-1, 3)
+
+    def minimiser(self) -> np.ndarray:
+        """By trying all sets of nodes that the ramp may act on: the energy is convex."""
+        level, slope = 0.1 + 0.5 / 2, 2 / 0.5  # f = slope (level - z) for z < level
+        found = []
+        for acting in product([0.0, 1.0], repeat=len(self.rest)):
+            rate = 8.0 * self.penalty.node_areas * slope * np.array(acting)
+            matrix = self.matrix + np.diag(np.kron(rate, [0.0, 0.0, 1.0]))
+            right = self.matrix @ self.rest.ravel() + np.kron(rate * level, [0.0, 0.0, 1.0])
+            points = np.linalg.solve(matrix, right).reshape(-1, 3)
+            if np.array_equal(points[:, 2] < level, acting):
+                found.append(points)
+        (only,) = found
+        return only
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_foreseen_steps_land_on_the_minimiser(seed: int) -> None:
+    """Truth: the minimiser of a convex, piecewise quadratic energy, found by trying every set of
+    nodes. Newton's step misses it unless that set acts already; solved again with what the step
+    switches, until nothing new does, one step lands on it."""
+    chain = Chain(seed)
+    expected, step = chain.minimiser(), chain.plain_step()
+    assert not np.allclose(chain.residual(chain.start), 0.0)
+    first = chain.penalty.foreseen(chain.start, step)
+    seen = 0 * first.switched
+    for _ in range(6):
+        found = chain.penalty.foreseen(chain.start, step)
+        if np.array_equal(found.switched, seen):
+            break
+        seen = found.switched
+        matrix = chain.tangent(chain.start) + found.hessian.toarray()
+        right = chain.residual(chain.start) + found.gradient.ravel()
+        step = np.linalg.solve(matrix, -right).reshape(-1, 3)
+    np.testing.assert_allclose(chain.start + step, expected, atol=1e-12)
+    acts, will = ((chain.penalty.ramp(p) > 0).astype(int) for p in (chain.start, expected))
+    np.testing.assert_array_equal(seen, will - acts)
+    missed = np.abs(chain.start + chain.plain_step() - expected).max()
+    assert (missed > 1e-3) if seen.any() else (missed < 1e-12)
+
+
+def test_chains_switch_both_ways() -> None:
+    """Truth: the chains above are no empty test: nodes begin to act, cease to, and do neither."""
+    switched = [
+        chain.penalty.foreseen(chain.start, chain.plain_step()).switched
+        for chain in map(Chain, range(12))
+    ]
+    assert {-1, 0, 1} == set(np.concatenate(switched))
+
+
+def test_foreseen_gradient_is_that_of_the_end_of_the_step() -> None:
+    """Truth: over a plane the ramp is linear on either side: gradient, tangent and what is foreseen
+    give the gradient after any step in every digit, and the tangent there, switched or not."""
+    random = np.random.default_rng(9)
+    penalty = penalty_of(HalfSpace(0.0), 40)
+    points, moves = random.uniform(-1.5, 1.5, (2, 40, 3))
+    found = penalty.foreseen(points, moves)
+    assert {-1, 0, 1} == set(found.switched)
+    assert found.gradient.shape == (40, 3)
+    assert found.hessian.shape == (120, 120)
+    matrix = (penalty.hessian(points) + found.hessian).toarray()
+    ahead = penalty.gradient(points) + found.gradient + (matrix @ moves.ravel()).reshape(-1, 3)
+    after = penalty.gradient(points + moves)
+    np.testing.assert_allclose(ahead, after, atol=1e-12 * np.abs(after).max())
+    np.testing.assert_allclose(matrix, penalty.hessian(points + moves).toarray(), atol=1e-12)
+    acts = [(penalty.ramp(p) > 0).astype(int) for p in (points, points + moves)]
+    np.testing.assert_array_equal(found.switched, acts[1] - acts[0])
+
+
+@VOLUMES
+def test_nothing_is_foreseen_where_nothing_switches(build: Callable[[], SignedDistance]) -> None:
+    """Truth: nodes that stay on their side of the ramp's end change nothing; nor does a rest."""
+    field = build()
+    points = np.vstack([nodes_near(field, -1.0, 0.1), nodes_near(field, 0.9, 3.0)])
+    penalty = penalty_of(field, len(points))
+    small = 0.05 * np.random.default_rng(2).uniform(-1, 1, points.shape)
+    for moves in (np.zeros_like(points), small):
+        found = penalty.foreseen(points, moves)
+        assert not found.switched.any()
+        assert not found.gradient.any()
+        assert not found.hessian.toarray().any()
+
+
+def test_foreseen_on_a_curved_wall() -> None:
+    """Truth: a node that goes straight to the wall of the root sees the distance grow linearly: it
+    is foreseen to act just when it will; one that goes along the tangent never is."""
+    penalty = penalty_of(CylinderRoot(RADIUS), 4)
+    angle = np.arange(4) * 1.3
+    axis, around = (
+        np.column_stack([np.cos(a), np.sin(a), np.zeros(4)]) for a in (angle, angle + np.pi / 2)
+    )
+    begins = RADIUS - penalty.clearance - penalty.width / 2  # radius from which the ramp acts
+    points = (begins - 0.2)[:, None] * axis
+    for length, expected in ((0.19, 0), (0.21, 1), (-1.0, 0)):
+        np.testing.assert_array_equal(penalty.foreseen(points, length * axis).switched, expected)
+        back = penalty.foreseen((begins + 0.2)[:, None] * axis, -length * axis)
+        np.testing.assert_array_equal(back.switched, -expected)
+    assert not penalty.foreseen(points, around).switched.any()

@@ -221,14 +221,15 @@ def test_clearances_out_of_reach(done: Done, tmp_path: Path) -> None:
     run = after(done, 21, tmp_path, set_up(FAILING)).run()
     assert run.result.failure is not None
     assert run.result.failure.startswith("root_wall: ")
-    wall, wedge, clamp = run.suturing.shortfalls(run.result.points)
+    wall, wedge, clamp, layers = run.suturing.shortfalls(run.result.points)
     assert max(wall, wedge) > 0.001
     for text in (
         f"short of the clearance by {wall:.3f} mm from the wall",
         f"{wedge:.3f} mm from the contact wedge",
         f"clamp off by {clamp:.1f} degrees rms",
-        "penalties of 64 kPa, 16 kPa and 10000 mN",
-        "raise maximum_stiffness of wall, contact or clamp",
+        f"layers by {layers:.3f} mm",
+        "penalties of 64 kPa, 16 kPa, 16 kPa and 10000 mN",
+        "raise maximum_stiffness of wall, contact, layers or clamp",
     ):
         assert text in run.result.failure
     assert run.names[21:] == ["equilibrium"]  # nothing could be raised
@@ -286,8 +287,8 @@ def test_a_failed_attempt_is_taken_back(
     run = after(done, 12, tmp_path)
     settle, tried = run.suturing._settle, set()
 
-    def second_time(state: np.ndarray) -> tuple[np.ndarray | None, str]:
-        settled, reason = settle(state)
+    def second_time(before: np.ndarray, state: np.ndarray) -> tuple[np.ndarray | None, str]:
+        settled, reason = settle(before, state)
         level = len(run.suturing.records)
         if level in tried:
             return settled, reason
@@ -309,7 +310,7 @@ def test_a_failed_level_keeps_what_belongs_to_its_state(
     that of the level before."""
     run = after(done, 16, tmp_path)
     settle = run.suturing._settle
-    monkeypatch.setattr(run.suturing, "_settle", lambda state: (None, settle(state)[1]))
+    monkeypatch.setattr(run.suturing, "_settle", lambda *states: (None, settle(*states)[1]))
     run.run()
     assert run.result.failure is not None
     assert run.result.failure.startswith("contact_wedge: stopped at 0.25 of 0.5;")

@@ -50,6 +50,98 @@ def test_wedges_that_cross_are_found_at_once() -> None:
         ValveInput.from_scene(parse_scene(scene))
 
 
+def same_input(first: ValveInput, second: ValveInput) -> None:
+    """Every number that a cusp is computed from is the same, to the last bit."""
+    assert first.scene == second.scene
+    for i in range(3):
+        one, two = first.geometry.cusps[i], second.geometry.cusps[i]
+        s = np.linspace(0.0, one.template.suture_length, 50)
+        for name in ("sutured_position", "sutured_tangent", "sutured_conormal"):
+            np.testing.assert_array_equal(getattr(one, name)(s), getattr(two, name)(s))
+        points = np.random.default_rng(1).uniform(-11, 11, (50, 3))
+        for lam in (0.0, 0.5, 1.0):
+            fields = [given_.wedges.wedge(i, lam).evaluate(points) for given_ in (first, second)]
+            for a, b in zip(*fields, strict=True):
+                np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(
+        first.geometry.commissures.points, second.geometry.commissures.points
+    )
+    np.testing.assert_array_equal(
+        first.geometry.triple_contact.point, second.geometry.triple_contact.point
+    )
+
+
+def demo(number: int) -> ValveInput:
+    """Input of one of the paper's experiments."""
+    return ValveInput.from_scene(load_scene(DEMOS / f"experiment_{number}.toml"))
+
+
+def test_equal_cusps_see_the_same() -> None:
+    """Truth: the three cusps of Experiment 1 are one cusp, turned: from each of them the valve is
+    the same input bit by bit, which three cusps 120 degrees apart in one frame are not."""
+    valve = demo(1)
+    for index in range(3):
+        same_input(valve.seen_from(index), valve)
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_seen_from_itself_and_all_round(number: int) -> None:
+    """Truth: cusp 0 sees the valve as it is; from cusp 1 and again from the next but one it is
+    seen as at first; the chords and cusps come in the order in which they follow."""
+    valve = demo(number)
+    assert valve.seen_from(0) is valve
+    same_input(valve.seen_from(1).seen_from(2), valve)
+    same_input(valve.seen_from(1).seen_from(1), valve.seen_from(2))
+    chords, cusps = valve.scene.commissures.chord_ratio, valve.scene.cusp
+    for index in range(3):
+        seen = valve.seen_from(index).scene
+        for i in range(3):
+            assert seen.commissures.chord_ratio[i] == chords[(index + i) % 3]
+            assert seen.cusp[i] == cusps[(index + i) % 3]
+        assert seen.root == valve.scene.root
+
+
+@pytest.mark.parametrize("index", [1, 2])
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_seen_from_a_cusp_it_is_the_same_valve(number: int, index: int) -> None:
+    """Truth: a turn about the axis, found from the corners of the suture lines, takes the valve as
+    a cusp sees it to the valve: all suture lines, commissures, C, and the distances to all wedges
+    of all points; the templates are those of the cusps that follow."""
+    valve = demo(number)
+    seen = valve.seen_from(index)
+    corner = [
+        np.arctan2(*each.suture_line.ends[0, 1::-1])
+        for each in (seen.geometry.cusps[0], valve.geometry.cusps[index])
+    ]
+    c, s = np.cos(corner[1] - corner[0]), np.sin(corner[1] - corner[0])
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    points = np.random.default_rng(3).uniform(-11, 11, (200, 3))
+    for i in range(3):
+        own, true = seen.geometry.cusps[i], valve.geometry.cusps[(index + i) % 3]
+        arc = np.linspace(0.0, own.template.suture_length, 60)
+        for name in ("sutured_position", "sutured_tangent", "sutured_conormal"):
+            np.testing.assert_allclose(
+                getattr(own, name)(arc) @ turn.T, getattr(true, name)(arc), atol=1e-12
+            )
+        assert own.template.parameters == true.template.parameters
+        np.testing.assert_allclose(
+            turn @ seen.geometry.commissures.points[i],
+            valve.geometry.commissures.points[(index + i) % 3],
+            atol=1e-12,
+        )
+        for lam in (0.0, 0.4, 1.0):
+            np.testing.assert_allclose(
+                seen.wedges.wedge(i, lam).evaluate(points)[0],
+                valve.wedges.wedge((index + i) % 3, lam).evaluate(points @ turn.T)[0],
+                atol=1e-9,
+            )
+    np.testing.assert_allclose(
+        turn @ seen.geometry.triple_contact.point,
+        valve.geometry.triple_contact.point,
+        atol=1e-9,
+    )
+
+
 @st.composite
 def scenes(draw: Any) -> dict[str, Any]:
     """Whatever the schema allows, plausible or not."""

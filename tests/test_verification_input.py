@@ -143,7 +143,7 @@ THIN_AND_THICK = [{"template": {"thickness": h}} for h in (0.4, 0.6, 0.5)]
 def test_layer_tolerance(tables: dict[str, Any], layers: float) -> None:
     """Truth: half the thickness of the thinnest cusp, or what the scene asks."""
     scene = parse_scene(tables)
-    found = tolerances_of(scene, ValveInput.from_scene(scene).geometry)
+    found = tolerances_of(ValveInput.from_scene(scene))
     assert found.layer_distance_mm == pytest.approx(layers)
 
 

@@ -85,7 +85,9 @@ class ClampPenalty:
         x, y = np.einsum("kd,kd->k", arm, first), np.einsum("kd,kd->k", arm, second)
         radial = x[:, None] * first + y[:, None] * second
         turning = x[:, None] * second - y[:, None] * first
-        return self.reference[0] + np.arctan2(y, x), x**2 + y**2, radial, turning
+        # an apex on its edge has no angle; where heights count, none is asked for
+        square = np.maximum(x**2 + y**2, np.finfo(float).tiny ** 0.25)
+        return self.reference[0] + np.arctan2(y, x), square, radial, turning
 
     def angles(self, points: Floats) -> Floats:
         """(k,) theta_e from -b towards t x b, counted without a jump since :meth:`renew` [rad]."""

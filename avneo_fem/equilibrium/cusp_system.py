@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from avneo_fem.constraints.self_contact import SelfContact
 from avneo_fem.constraints.term import Foreseeing, Foreseen, Term
 from avneo_fem.equilibrium.shell_model import ShellModel
+from avneo_fem.equilibrium.stopwatch import Stopwatch
 
 __all__ = ["CuspSystem"]
 
@@ -38,6 +40,7 @@ class CuspSystem:
 
     def __init__(self, model: ShellModel, contact: SelfContact | None) -> None:
         self.model, self.contact = model, contact
+        self.stopwatch = Stopwatch()
         self.terms: list[Term] = []
         self.dead_load: Floats | None = None
         self.force_scale: float | None = None
@@ -72,14 +75,19 @@ class CuspSystem:
         contact = [] if self.contact is None else [self.contact]
         return [*contact, *self.terms, *extra]
 
+    def _counted(self, term: Term) -> AbstractContextManager[None]:
+        return self.stopwatch.part("collision" if term is self.contact else "penalties")
+
     def residual(self, state: Floats, extra: Sequence[Term] = ()) -> Floats:
         """Out-of-balance force of every unknown, (size,); held ones carry their reaction."""
-        result = self.model.residual(state)
+        with self.stopwatch.part("assembly"):
+            result = self.model.residual(state)
         if self.dead_load is not None:
             result -= self.dead_load
         points = self.positions(state)
         for term in self._active(extra):
-            result[self.model.position_dofs] += term.gradient(points)
+            with self._counted(term):
+                result[self.model.position_dofs] += term.gradient(points)
         return result
 
     def relative_residual(self, state: Floats) -> float:
@@ -91,9 +99,11 @@ class CuspSystem:
         points = self.positions(state)
         total: sp.spmatrix | None = None
         for term in self._active(extra):
-            hessian = term.hessian(points)
+            with self._counted(term):
+                hessian = term.hessian(points)
             total = hessian if total is None else total + hessian
-        stiffness = self.model.tangent(state)
+        with self.stopwatch.part("assembly"):
+            stiffness = self.model.tangent(state)
         if total is None:
             return stiffness
         return (stiffness + self._expand @ total.tocsr() @ self._expand.T).tocsr()
@@ -116,13 +126,19 @@ class CuspSystem:
         """Energy of all conservative parts [mN mm]."""
         points = self.positions(state)
         dead = 0.0 if self.dead_load is None else float(self.dead_load @ state)
-        return self.model.energy(state) - dead + sum(t.energy(points) for t in self._active(extra))
+        with self.stopwatch.part("assembly"):
+            total = self.model.energy(state) - dead
+        for term in self._active(extra):
+            with self._counted(term):
+                total += term.energy(points)
+        return total
 
     def foreseen(self, state: Floats, step: Floats) -> Foreseen | None:
         """Change of residual and tangent when ``step`` (size,) is taken, as far as terms foresee
         it; arrays are (size,) and (size, size). None without such terms."""
         points, moves = self.positions(state), self.positions(step)
-        found = [t.foreseen(points, moves) for t in self.terms if isinstance(t, Foreseeing)]
+        with self.stopwatch.part("penalties"):
+            found = [t.foreseen(points, moves) for t in self.terms if isinstance(t, Foreseeing)]
         if not found:
             return None
         residual = np.zeros(self.model.size)

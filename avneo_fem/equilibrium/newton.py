@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -150,10 +150,12 @@ class NewtonSolver:
         while True:
             matrix = self._tangent if shift == 0.0 else self._tangent + sp.diags(shift * self._mass)
             try:
-                negative = self.symmetric.factorize(matrix)
+                with self._factorizing():
+                    negative = self.symmetric.factorize(matrix)
                 if negative == 0:
                     self._shift = shift
-                    direction = self.symmetric.solve(force)
+                    with self._factorizing():
+                        direction = self.symmetric.solve(force)
                     # follower pressure at the free edge is not symmetric: near the end that counts
                     if shift == 0.0 and close:
                         direction = self._unsymmetric(force)
@@ -181,9 +183,10 @@ class NewtonSolver:
             last = found.switched
             self.looks += 1
             with suppress(FactorizationError):
-                if self.ahead.factorize(matrix + found.hessian[self._free][:, self._free]):
-                    return direction
-                better = self.ahead.solve(force + found.gradient[self._free])
+                with self._factorizing():
+                    if self.ahead.factorize(matrix + found.hessian[self._free][:, self._free]):
+                        return direction
+                    better = self.ahead.solve(force + found.gradient[self._free])
                 if not np.isfinite(better).all() or better @ force <= 0:
                     return direction
                 direction = better
@@ -191,9 +194,13 @@ class NewtonSolver:
             return direction
         return direction
 
+    def _factorizing(self) -> AbstractContextManager[None]:
+        return self.system.stopwatch.part("factorization")
+
     def _unsymmetric(self, force: Floats) -> Floats:
-        self.general.factorize(self._tangent)
-        return self.general.solve(force)
+        with self._factorizing():
+            self.general.factorize(self._tangent)
+            return self.general.solve(force)
 
     def _length(self, direction: Floats) -> float:
         step = np.zeros(self.system.model.size)
@@ -204,7 +211,8 @@ class NewtonSolver:
         self._convex = self._convex and share == 1.0
         contact = self.system.contact
         if contact is not None:
-            clear = contact.step_fraction(self.system.positions(self._base), share * moves)
+            with self.system.stopwatch.part("collision"):
+                clear = contact.step_fraction(self.system.positions(self._base), share * moves)
             if clear < 1.0:
                 share *= self.settings.safety * clear
         self._asked, self._share = share * float(np.linalg.norm(direction)), share

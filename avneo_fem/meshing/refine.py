@@ -58,9 +58,16 @@ def nested_meshes(
     """
     try:
         meshes = [triangulate_template(template, size * 2.0**refinements)]
-    except SceneError:
-        if not fewer_will_do or refinements == 0:
+    except SceneError as error:
+        if refinements == 0:
             raise
+        if not fewer_will_do:
+            raise SceneError(
+                "mesh.refinements",
+                refinements,
+                f"the first mesh, {size * 2.0**refinements:.3g} mm, is too coarse: {error.valid};"
+                " take fewer, or leave it out",
+            ) from None
         return nested_meshes(template, size, refinements - 1)
     for _ in range(refinements):
         meshes.append(refine(meshes[-1], template))

@@ -117,10 +117,21 @@ def build_report(
             "total_s": seconds,
             "jit_s": compile_seconds,
             "solve_s": sum(result.seconds for result in results),
+            **_shares(results),
             "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
             "ranks": ranks,
         },
     }
+
+
+def _shares(results: list[CuspResult]) -> dict[str, float]:
+    """Seconds of ``solve_s`` by what was done, copied cusps apart."""
+    total: dict[str, float] = {}
+    for result in results:
+        if result.copied_from is None:
+            for name, seconds in result.shares.items():
+                total[f"{name}_s"] = total.get(f"{name}_s", 0.0) + seconds
+    return total
 
 
 def _plain(value: Any) -> Any:

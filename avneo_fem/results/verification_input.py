@@ -48,7 +48,7 @@ def constraints_of(
     plane = geometry.commissures
     return Constraints(
         radius=geometry.root.radius,
-        wedge=wedges.wedge(index, 1.0).polyline3(2000, 4 * geometry.root.radius)[:, :2],
+        wedge=wedges.wedge(index, 1.0).polyline3(500, 4 * geometry.root.radius)[:, :2],
         wedge_inside=lowest[:2],
         plane_point=plane.points[0],
         plane_normal=plane.normal,

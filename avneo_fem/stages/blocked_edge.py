@@ -122,10 +122,13 @@ def blocked_row(
     clear = np.logical_and.accumulate(distance >= clearance[apex][:, None] - slack, axis=1)
     room = np.maximum(clear.sum(axis=1) / _SAMPLES * height, slack)
     blocked = (room < _ROOM * height) & ~np.isin(apex, mesh.suture_line)
+    length = np.linalg.norm(along, axis=1)
+    # a node that has to stay at the free edge cannot go near the next bend: then it is left free
+    blocked &= ~at_free_edge | (_bends(tangent) * length <= room)
     order = np.flatnonzero(blocked)[np.argsort(room[blocked], kind="stable")]
     nodes, first = np.unique(apex[order], return_index=True)
     edge = order[first]
-    share = _cleared_of_bends(share, tangent, np.linalg.norm(along, axis=1), room)
+    share = _cleared_of_bends(share, tangent, length, room)
     foot[~at_free_edge] = (target[:-1] + share[:, None] * along)[~at_free_edge]
     normal = np.cross(tangent[edge], -inward[edge])
     laid = np.isin(apex, nodes)
@@ -140,11 +143,17 @@ def _cleared_of_bends(share: Floats, tangent: Floats, length: Floats, room: Floa
     edge that is away from the commissure.
     """
     count = len(share)
+    ahead = np.arange(count) < count / 2
+    allowed = room / (2.0 * np.maximum(_bends(tangent), 1e-9)) / length
+    from_end = np.minimum(np.where(ahead, 1.0 - share, share), allowed)
+    return np.where(ahead, 1.0 - from_end, from_end)
+
+
+def _bends(tangent: Floats) -> Floats:
+    """(k-1,) angle of the suture line at the end of each edge that is away from its commissure."""
+    count = len(tangent)
     bend = np.zeros(count + 1)
     cosine = np.einsum("kd,kd->k", tangent[:-1], tangent[1:])
     bend[1:-1] = np.arccos(np.clip(cosine, -1.0, 1.0))
-    ahead = np.arange(count) < count / 2
-    corner = np.where(ahead, np.arange(count) + 1, np.arange(count))
-    allowed = room / (2.0 * np.maximum(bend[corner], 1e-9)) / length
-    from_end = np.minimum(np.where(ahead, 1.0 - share, share), allowed)
-    return np.where(ahead, 1.0 - from_end, from_end)
+    number = np.arange(count)
+    return bend[np.where(number < count / 2, number + 1, number)]

@@ -126,6 +126,7 @@ class CuspSetup:
         other = CuspSetup(self.scene, self.geometry, self.wedges, self.index, mesh, start)
         other.compile_seconds += self.compile_seconds
         other.newton.iterations = self.newton.iterations
+        other.system.stopwatch = self.system.stopwatch
         other.wall.stiffness, other.wedge.stiffness = self.wall.stiffness, self.wedge.stiffness
         other.clamp.stiffness = self.clamp.stiffness
         other.layers.stiffness = self.layers.stiffness

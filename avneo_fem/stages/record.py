@@ -47,7 +47,8 @@ class CuspResult:
 
     ``residual`` is that of the final undamped equilibrium over the pressure load; ``failure``
     says which stage failed and why, None when all ran. ``copied_from`` is the index of the
-    congruent cusp this one was rotated from.
+    congruent cusp this one was rotated from, ``shares`` the seconds spent in assembly,
+    factorization, collision, penalties and all the rest ("python"), compilation apart.
     """
 
     index: int
@@ -61,3 +62,4 @@ class CuspResult:
     compile_seconds: float
     seconds: float
     copied_from: int | None = None
+    shares: dict[str, float] = field(default_factory=dict)

@@ -98,7 +98,9 @@ class CuspSuturing:
             residual = self.setup.system.relative_residual(state)
             done = len(self.levels) if failure is None else self._reached
             self._save(state, done, True, residual, failure)
-        setup = self.setup
+        setup, seconds = self.setup, time.perf_counter() - clock
+        shares = dict(setup.system.stopwatch.seconds)
+        shares["python"] = seconds - sum(shares.values())
         return CuspResult(
             index=self.index,
             mesh=setup.mesh,
@@ -109,7 +111,8 @@ class CuspSuturing:
             dofs=setup.model.size,
             failure=failure,
             compile_seconds=setup.compile_seconds,
-            seconds=time.perf_counter() - clock,
+            seconds=seconds,
+            shares=shares,
         )
 
     def _run_from(self, state: Floats, done: int) -> tuple[Floats, str | None]:
