@@ -95,6 +95,7 @@ def build_report(
                 "stages": [asdict(record) for record in result.records],
                 **asdict(measured),
                 "clamp_error_deg": {"largest": largest, "rms": rms},
+                "energy_mn_mm": result.energy,
                 "failure": result.failure,
                 "copied_from": result.copied_from,
             }

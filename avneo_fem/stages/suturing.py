@@ -46,6 +46,16 @@ _BOUNDARY_ITERATIONS = 6
 #: a row that layers keep from the last of its way lies well enough; the judge looks at it, too
 _ROW_FAR_ENOUGH = 0.95
 
+#: what may help when a stage cannot be completed
+_ADVICE = {
+    "boundary": "raise solver.boundary_steps, or refine mesh.size",
+    "hinged_edge": "raise solver.maximum_iterations, or refine mesh.size",
+    "clamped_edge": "raise solver.clamp_steps, or refine mesh.size",
+    "contact_wedge": "raise contact.steps, or refine mesh.size",
+    "refinement": "choose other mesh.refinements (0 splits nothing), or another mesh.size",
+    "first_row": "refine mesh.size, or raise solver.inside_tolerance",
+}
+
 
 class CuspSuturing:
     """Runs the stages of one cusp.
@@ -79,6 +89,7 @@ class CuspSuturing:
         self.options = setup.scene.solver
         self.records: list[StageRecord] = []
         self.snapshots: list[Snapshot] = []
+        self._said = ""
         self._prepare(setup)
 
     def _prepare(self, setup: CuspSetup) -> None:
@@ -113,6 +124,7 @@ class CuspSuturing:
             compile_seconds=setup.compile_seconds,
             seconds=seconds,
             shares=shares,
+            energy=setup.system.energy(state),
         )
 
     def _run_from(self, state: Floats, done: int) -> tuple[Floats, str | None]:
@@ -271,12 +283,12 @@ class CuspSuturing:
             try:
                 safe = self._undoing(attempt)
                 state, steps = march(state, before, after, safe, step, smallest, name)
-                reason = reason or "converged: residual below tolerance"
+                reason = reason or self._said.split(", residual")[0]
             except StageFailed as error:
                 state, after, steps = error.state, error.parameter, error.steps
-                reason = str(error)
+                reason = f"{error}; {_ADVICE[name]}"
                 if name != "first_row" or after < _ROW_FAR_ENOUGH:
-                    failure = error
+                    failure = StageFailed(reason, state, after, steps)
         # a failed level is no place to go on from: it would be run again from its middle
         kept = done if failure is None else None
         parameter = self._mesh_size(level) if name == "refinement" else after
@@ -335,6 +347,7 @@ class CuspSuturing:
             clamp, reference = setup.clamp.stiffness, setup.clamp.reference
             directors = self._directors()
             result, reason = attempt(state, start, stop)
+            self._said = reason
             if result is None:
                 model.pressure, setup.wedge.field = pressure, field
                 setup.clamp.stiffness, setup.clamp.reference = clamp, reference
