@@ -390,12 +390,7 @@ def test_a_new_run_replaces_the_old_report_first(small_run: Run, tmp_path: Path)
                 strict=True, reason="cusp 0 (J_sl = 0.40) was not seen to finish in minutes"
             ),
         ),
-        pytest.param(
-            3,
-            marks=pytest.mark.xfail(
-                strict=True, reason="cusps 0.39 mm apart at the commissures, 0.40 mm required"
-            ),
-        ),
+        3,
     ],
 )
 def test_experiments(number: int, size: float, tmp_path: Path) -> None:

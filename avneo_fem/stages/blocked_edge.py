@@ -76,6 +76,7 @@ def blocked_row(
     target: Floats,
     conormal: Floats,
     wedge: SignedDistance,
+    wall: SignedDistance,
     clearance: Floats,
     slack: float,
     upward: Floats,
@@ -91,8 +92,8 @@ def blocked_row(
         Sutured nodes in place [mm].
     conormal : (k-1, 3) array
         Outward conormal b of the suture edges: the cusp leaves along -b (3.1).
-    wedge : SignedDistance
-        The closed contact wedge.
+    wedge, wall : SignedDistance
+        The closed contact wedge, and the root, which the places do not leave.
     clearance : (n,) array
         d_0 of every node from it [mm].
     slack : float
@@ -130,9 +131,16 @@ def blocked_row(
     edge = order[first]
     share = _cleared_of_bends(share, tangent, length, room)
     foot[~at_free_edge] = (target[:-1] + share[:, None] * along)[~at_free_edge]
-    normal = np.cross(tangent[edge], -inward[edge])
+    # a half-plane along the wall leaves a round root: by reach^2/2R
+    place = foot[edge] + room[edge, None] * inward[edge]
+    outside, radial, _ = wall.evaluate(place)
+    way = place - np.minimum(outside, 0.0)[:, None] * radial - foot[edge]
+    reach = np.linalg.norm(way, axis=1)
+    way /= reach[:, None]
+    along = tangent[edge] - np.einsum("jd,jd->j", tangent[edge], way)[:, None] * way
+    along /= np.linalg.norm(along, axis=1)[:, None]
     laid = np.isin(apex, nodes)
-    return LaidRow(nodes, foot[edge], tangent[edge], inward[edge], normal, room[edge], laid)
+    return LaidRow(nodes, foot[edge], along, way, np.cross(along, -way), reach, laid)
 
 
 def _cleared_of_bends(share: Floats, tangent: Floats, length: Floats, room: Floats) -> Floats:

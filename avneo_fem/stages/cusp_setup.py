@@ -212,6 +212,7 @@ class CuspSetup:
             self.target,
             self.conormal,
             self.wedges.wedge(self.index, 1.0),
+            self.geometry.root,
             self.wedge.clearance,
             0.4 * self.scene.inside_tolerance(self.cusp.thickness),
             self.geometry.commissures.normal,
