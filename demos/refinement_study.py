@@ -354,13 +354,13 @@ HEAD = """# Refinement study: {name}, cusp 0
 
 Written by `python demos/refinement_study.py --sizes {sizes}` (quality equilibrium, every cusp
 verified). Columns are mesh sizes h in mm; "other path" starts from a first mesh of half the edge
-length, so it is another triangulation of the same h, reached another way. An order of
-convergence stands only where the three sizes give one between 0.5 and 4 and the last change is
-more than twice the largest difference between two paths to the same h. A place touches the wedge
-when it is within the clearance and the 0.05 mm over which the penalty acts; "near the suture" is
-nearer than the distance from which layers keep their clearance (4 H). The free edge and the
-mid-line are compared at the same places of the template, "as curves" at the nearest ones.
-Seconds are those of a shared machine.
+length (twice, where none is coarser), so it is another triangulation of the same h, reached
+another way. An order of convergence stands only where the three sizes give one between 0.5 and 4
+and the last change is more than twice the largest difference between two paths to the same h. A
+place touches the wedge when it is within the clearance and the 0.05 mm over which the penalty
+acts; "near the suture" is nearer than the distance from which layers keep their clearance (4 H).
+The free edge and the mid-line are compared at the same places of the template, "as curves" at
+the nearest ones. Seconds are those of a shared machine.
 """
 
 
@@ -481,6 +481,8 @@ def main(arguments: list[str] | None = None) -> int:
     sizes = sorted(set(asked.sizes), reverse=True)
     try:
         scene = load_scene(asked.scene)
+        solver = scene.solver.model_copy(update={"quality": "equilibrium"})
+        scene = scene.model_copy(update={"solver": solver, "fidelity": "standard"})
         given = ValveInput.from_scene(scene)
         asked.out.mkdir(parents=True, exist_ok=True)
         runs = [reported(suture(scene, size)) for size in sizes]

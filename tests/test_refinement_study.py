@@ -50,7 +50,7 @@ def rolled(points: Any, radius: float) -> Any:
 
 
 def test_samples() -> None:
-    """Truth: a rectangle's area, and its integrals of x, y and their squares to the sampling's order."""
+    """Truth: a rectangle's area, and its moments to the sampling's order."""
     points, triangles = sheet(3)
     places, areas = study.samples(lifted(points), triangles)
     assert areas.sum() == pytest.approx(60.0)

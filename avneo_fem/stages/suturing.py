@@ -7,7 +7,8 @@ turns the edge into its tangent half-plane (step 4), and ``contact_wedge`` close
 lambda = 0 ... 1 (§3.4 step 2). Each ``refinement`` splits the triangles into four and goes on from
 the same surface, which is free of crossings, too. ``first_row`` lays down what has no room in its
 half-plane (``stages.blocked_edge``), ``root_wall`` raises the penalties of wall, wedge and clamp
-until each holds (step 3), and ``equilibrium`` converges the result.
+until each holds (step 3) and has the
+layers keep their clearance, and ``equilibrium`` converges the result.
 """
 
 from __future__ import annotations
@@ -234,17 +235,15 @@ class CuspSuturing:
         ``parameter`` is where the level starts, or its end when it is behind the state.
         """
         setup, name = self.setup, level.name
-        # a term that asks for nothing is none
-        layers = [setup.layers] if setup.layers.clearance > 0 else []
         if name == "hinged_edge":
             # from here on the cusp must not slip behind its own sutured edge
-            setup.system.terms = [setup.wall, *layers]
+            setup.system.terms = [setup.wall]
         elif name == "clamped_edge":
             setup.system.fix(setup.model.angle_dofs[self._suture_edges(~setup.row.is_blocked)])
-            setup.system.terms = [setup.wall, *layers, setup.clamp]
+            setup.system.terms = [setup.wall, setup.clamp]
         elif name == "contact_wedge":
             clamp = [setup.clamp] if setup.scene.material.bending else []
-            setup.system.terms = [setup.wall, *layers, *clamp, setup.wedge]
+            setup.system.terms = [setup.wall, *clamp, setup.wedge]
             setup.wedge.field = setup.wedges.wedge(setup.index, max(parameter, 0.0))
         elif name == "first_row":
             setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
@@ -484,6 +483,9 @@ class CuspSuturing:
     def _raise_until_inside(self, state: Floats) -> Floats:
         """Raise the penalties until clearances and clamp hold, then converge (§3.4 step 3)."""
         setup, scene = self.setup, self.setup.scene
+        if setup.layers.clearance > 0:
+            # not before: coarse folds are sharper than the clearance
+            setup.system.terms = [*setup.system.terms, setup.layers]
         # less than what is judged: the judge also looks between the nodes
         inside = 0.5 * scene.inside_tolerance(setup.cusp.thickness)
         allowed = (inside, inside, scene.clamp.tolerance_degrees, inside)
