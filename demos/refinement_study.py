@@ -367,47 +367,49 @@ the nearest ones. Seconds are those of a shared machine.
 WRITTEN = "Written after a run of the default sizes; its figures are filled in by the script."
 DISCUSSION = """\
 **The same on every mesh.** The height of the free edge over the plane M, which (1.6) prescribes
-(mean {height} mm), and the lowest point of the belly (z = {lowest} mm).
+(mean {height} mm). From h = 1 on also the lowest point of the belly, to two tenths of a
+millimetre (z = {lowest} mm); at 1.4 a fold through it makes more of a difference.
 
-**Depends on h.** The free edge from above: h = 1.4 and 1 are {fe_14} and
-{fe_10} mm in the mean from h = 0.7, while two paths to the same h differ by {fe_p14} (1.4),
-{fe_p10} (1) and {fe_p07} mm (0.7). So this is mostly h, and the path matters less the finer
-the mesh. Much of it is the edge sliding along itself: as curves h = 1.4 and 1 are {curve_14} and
-{curve_10} mm from 0.7. The edge cuts the outer bend of its wedge and reaches farther out on a
-finer mesh (greatest distance from the wedge {reach} mm). The change from 1 to 0.7 is not smaller
-than that from 1.4 to 1: there is no order to claim, and the error left at 0.7 is not known. The
-length of the edge ({length} mm), the sag of the mid-line ({sag} mm) and the largest thickness
-stretch away from the suture ({thick}) seem to settle from 1.4 over 1 to 0.7, but the paths to
-one h differ by more than that: no convergence can be read from them either.
+**Depends on h.** The free edge from above: h = 1.4 and 1 are {fe_14} and {fe_10} mm in the mean
+from h = 0.7, while two paths to the same h differ by {fe_p14} (1.4), {fe_p10} (1) and {fe_p07}
+mm (0.7). So this is mostly h, and the path matters less the finer the mesh. Much of it is the
+edge sliding along itself: as curves h = 1.4 and 1 are {curve_14} and {curve_10} mm from 0.7. The
+edge cuts the outer bend of its wedge and reaches farther out on a finer mesh (greatest distance
+from the wedge {reach} mm). The steps do not shrink reliably from mesh to mesh: there is no order
+to claim, and the error left at 0.7 is not known. The length of the edge ({length} mm), the sag
+of the mid-line ({sag} mm) and the largest thickness stretch away from the suture ({thick})
+change with h about as much as between the paths to one h: no convergence can be read from them
+either.
 
-**Does not converge, and need not.** The edge of the cusp is {gather} times as long as the line it
-is sutured to, and folds; which folds is a choice among many equilibria, each solved to the
+**Does not converge, and need not.** The edge of the cusp is {gather} times as long as the line
+it is sutured to, and folds; which folds is a choice among many equilibria, each solved to the
 residual above. Away from the suture the surfaces at h = 1.4 and 1 are {s_14} and {s_10} mm from
 the one at 0.7 in the mean, 95 % within {q_14} and {q_10} mm, up to {m_14} and {m_10} mm at a
 fold. But two paths to the same h are as far apart: {s_p14}, {s_p10} and {s_p07} mm, 95 % within
 {q_p14}, {q_p10} and {q_p07} mm, up to {m_p14}, {m_p10} and {m_p07} mm. So this is the folds,
-which run from the suture into the belly, and h has no visible share in it. For the same reason
-the mid-line, which may meet a fold, differs by up to {mid_p07} mm between the paths to 0.7, and
-the lower end of the contact by {c_p07} mm in the mean, {cm_p07} mm at worst.
+which run from the suture into the belly, and h has next to no share in it. A change of the
+solver, however small, may choose other folds too. For the same reason the mid-line, which may
+meet a fold, differs by up to {mid_p07} mm between the paths to 0.7, and the lower end of the
+contact by {c_p07} mm in the mean, {cm_p07} mm at worst.
 
-**Contact.** The area within reach of the wedge is {area} mm², the length of the free edge
-there {touching} mm. The two largest of each belong to the runs whose wedge closed on the last mesh
+**Contact.** The area within reach of the wedge is {area} mm², the length of the free edge there
+{touching} mm. The two largest of each belong to the runs whose wedge closed on the last mesh
 itself (other paths to 1.4 and 1): here the path counts for more than h. Along the second half of
 the wedge only the part near the commissure touches, on every mesh (third picture).
 
-**Sharing the first mesh.** h = 1.4 and 0.7 come from the same 2.8 mm mesh, 1 does not. It does not
-make their folds alike: 1.4 is as far from 0.7 as 1 is.
+**Sharing the first mesh.** h = 1.4 and 0.7 come from the same 2.8 mm mesh, 1 does not. It does
+not make their folds alike: 1.4 is no nearer to 0.7 than 1 is.
 
-**Not a result.** Some triangles of the first row at the suture collapse, to thickness stretches of
-{worst}, and layers there come within {near} mm, as they may by default (away from the
-suture they keep {far} mm). That says how far such a triangle can be squeezed, not how
-thick tissue gets. The share of the template that is more than twice as thick is {share} %.
+**Not a result.** Some triangles of the first row at the suture collapse, to thickness stretches
+of {worst}, and layers there come within {near} mm, as they may by default (away from the suture
+they keep {far} mm). That says how far such a triangle can be squeezed, not how thick tissue
+gets. The share of the template that is more than twice as thick is {share} %.
 
 So the height of the free edge can be taken from any of these meshes to a few hundredths of a
-millimetre, the depth of the belly to two tenths; the free edge in plan from h = 0.7 to some
-tenths, whose error this study does not bound; the surface to {s_p07} mm in the mean and no
-better than about two millimetres at a fold; the coapting area to some 20 %. A single fold is not
-a prediction.
+millimetre, the depth of the belly from h = 1 to two tenths; the free edge in plan from h = 0.7
+to some tenths, whose error this study does not bound; the surface to {s_p07} mm in the mean and
+no better than about two millimetres at a fold; the coapting area to some 20 %. A single fold is
+not a prediction.
 """
 
 
