@@ -141,8 +141,8 @@ class Solver(Table):
 
     quality: Literal["equilibrium", "approximate"] = Field(
         "equilibrium",
-        description="equilibrium converges every level without ever crossing; approximate takes a"
-        " few damped iterations a level and then the crossings apart",
+        description="equilibrium converges every level without ever crossing; approximate does so"
+        " on the first mesh only, and then resolves collisions and takes a few damped iterations",
     )
     approximate_iterations: Annotated[int, Field(ge=1)] = Field(
         6, description="iterations a level of quality approximate"

@@ -2,8 +2,8 @@
 
 The paper's Algorithm 1.1 (SolveQSEProb) stops after a few iterations and repairs what crosses as
 Bridson et al. do. Levels, constraints and record are those of ``stages.suturing``, and on the
-coarser meshes, where that is quick, so are the solves: the cusp comes to the finest mesh inside
-and free of crossings. There a move that collides is not halved but resolved
+first, coarsest mesh, where that is quick, so are the solves: the cusp leaves it inside and free of
+crossings. On the finer meshes a move that collides is not halved but resolved
 (``constraints.collision_response``), and no level converges: a few damped iterations, none of
 which crosses, and an end when the mid-surface is inside.
 """
@@ -41,15 +41,15 @@ class ApproximateSuturing(CuspSuturing):
         self.levels = [level for level in self.levels if level.name != "first_row"]
 
     def _is_quick(self) -> bool:
-        return bool(self.finer) and self.setup.mesh is self.finer[-1]
+        return any(self.setup.mesh is mesh for mesh in self.finer)
 
     def _enter_mesh(self, level: Level, state: Floats) -> Floats:
-        if level.mesh == len(self.finer):
+        if level.mesh == 1:
             state = self._raise_until_inside(state)
         return super()._enter_mesh(level, state)
 
     def _blocked(self, state: Floats, move: Floats) -> str | None:
-        # on the finest mesh collisions of the move are resolved
+        # on finer meshes collisions of the move are resolved
         return None if self._is_quick() else super()._blocked(state, move)
 
     def _damped(self, before: Floats, trial: Floats) -> Outcome:
