@@ -19,7 +19,8 @@ from avneo_fem.constraints.collision_response import CrossingsRemain, resolve
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.levels import Level
-from avneo_fem.stages.suturing import CuspSuturing, Outcome
+from avneo_fem.stages.moves import Outcome
+from avneo_fem.stages.suturing import CuspSuturing
 
 __all__ = ["ApproximateSuturing"]
 

@@ -1,0 +1,145 @@
+"""The last stages of a cusp: penalties are raised until each holds, and all converges."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avneo_fem.stages.continuation import StageFailed
+from avneo_fem.stages.cusp_setup import CuspSetup
+from avneo_fem.stages.levels import Level
+from avneo_fem.stages.moves import SETTLE_DAMPING, CuspMoves
+
+__all__ = ["PenaltyRaising"]
+
+Floats = NDArray[np.float64]
+
+
+class PenaltyRaising(CuspMoves):
+    """The end of the stages (paper §3.4 step 3).
+
+    Parameters
+    ----------
+    setup : CuspSetup
+        Model, constraints and solver of the present mesh.
+    levels : list of Level
+        What comes before.
+    """
+
+    def __init__(self, setup: CuspSetup, levels: list[Level]) -> None:
+        super().__init__(setup)
+        self.levels = levels
+
+    def _keep(
+        self,
+        state: Floats,
+        name: str,
+        parameter: float,
+        used: int,
+        reason: str,
+        clock: float,
+        steps: int,
+        done: int | None,
+    ) -> None:
+        """Record of a level; see ``CuspSuturing``."""
+        raise NotImplementedError
+
+    def outside(self, points: Floats) -> tuple[float, float]:
+        """Largest depth of a node outside the root and outside the contact wedge [mm]."""
+        wall, wedge = self.setup.wall.evaluate(points)[0], self.setup.wedge.evaluate(points)[0]
+        return float((-wall).max(initial=0.0)), float((-wedge).max(initial=0.0))
+
+    def shortfalls(self, points: Floats) -> tuple[float, float, float, float]:
+        """How far wall, wedge, clamp and layers are from what they must hold.
+
+        Returns
+        -------
+        (wall, wedge, clamp, layers)
+            Largest miss of the clearances [mm], sutured nodes apart; within the taper the node
+            need only be inside the root. Clamp: rms angle to the half-plane [degrees].
+        """
+        setup = self.setup
+        free = np.ones(len(points), dtype=bool)
+        free[setup.mesh.suture_line] = False
+        free[setup.row.nodes] = False
+        distance = setup.wall.evaluate(points)[0]
+        tapered = setup.wall.clearance < setup.wall.clearance.max()
+        wall = np.where(tapered, -distance, setup.wall.clearance - distance)
+        wedge = setup.wedge.shortfall(points)
+        clamp = setup.clamp.rms_angle(points) if setup.scene.material.bending else 0.0
+        return (
+            float(wall[free].max(initial=0.0)),
+            float(wedge[free].max(initial=0.0)),
+            float(np.degrees(clamp)),
+            setup.layers.shortfall(points),
+        )
+
+    def _raise_until_inside(self, state: Floats) -> Floats:
+        """Raise the penalties until clearances and clamp hold, then converge (§3.4 step 3)."""
+        setup, scene = self.setup, self.setup.scene
+        if setup.layers.clearance > 0:
+            # not before: coarse folds are sharper than the clearance
+            setup.system.terms = [*setup.system.terms, setup.layers]
+        # less than what is judged: the judge also looks between the nodes
+        inside = 0.5 * scene.inside_tolerance(setup.cusp.thickness)
+        allowed = (inside, inside, scene.clamp.tolerance_degrees, inside)
+        limits = (
+            scene.wall.maximum_stiffness,
+            scene.contact.maximum_stiffness,
+            scene.clamp.maximum_stiffness,
+            scene.layers.maximum_stiffness,
+        )
+        while True:
+            misses = self.shortfalls(setup.system.positions(state))
+            late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
+            if not any(late):
+                state = self._converge(state, "equilibrium", self.options.tolerance)
+                misses = self.shortfalls(setup.system.positions(state))
+                if all(miss <= most for miss, most in zip(misses, allowed, strict=True)):
+                    return state
+                continue
+            raised = False
+            for term, limit, miss, most in zip(
+                self._penalties(), limits, misses, allowed, strict=True
+            ):
+                if miss > most and term.stiffness < limit:
+                    # no more than is missing: stiff penalties cost digits
+                    factor = min(scene.wall.growth, 1.3 * miss / most)
+                    term.stiffness = min(limit, factor * term.stiffness)
+                    raised = True
+            if not raised:
+                state = self._converge(state, "equilibrium", self.options.tolerance)
+                raise StageFailed(self._what_is_missing(state), state, setup.wall.stiffness, 0)
+            state = self._converge(state, "root_wall", self.options.path_tolerance)
+
+    def _what_is_missing(self, state: Floats) -> str:
+        setup = self.setup
+        wall, wedge, clamp, layers = self.shortfalls(setup.system.positions(state))
+        return (
+            f"root_wall: short of the clearance by {wall:.3f} mm from the wall and {wedge:.3f} mm"
+            f" from the contact wedge, layers by {layers:.3f} mm, clamp off by {clamp:.1f} degrees"
+            f" rms, at penalties of {setup.wall.stiffness:g} kPa, {setup.wedge.stiffness:g} kPa,"
+            f" {setup.layers.stiffness:g} kPa and {setup.clamp.stiffness:g} mN; refine mesh.size,"
+            " or raise maximum_stiffness of wall, contact, layers or clamp, or the tolerance"
+        )
+
+    def _converge(self, state: Floats, name: str, tolerance: float) -> Floats:
+        clock, used = time.perf_counter(), self.setup.newton.iterations
+        self.setup.newton.forget()
+        budget = 10 * self.options.maximum_iterations
+        relaxation = self.setup.relaxation
+        self.setup.clamp.renew(self.setup.system.positions(state))
+        state, verdict = relaxation.settle(state, tolerance, SETTLE_DAMPING, budget)
+        stiffness = self.setup.wall.stiffness
+        # after the last equilibrium comes the checkpoint of the finished cusp
+        done = None if name == "equilibrium" else len(self.levels)
+        self._keep(state, name, stiffness, used, verdict.reason, clock, 1, done)
+        if not verdict.converged:
+            message = (
+                f"{name}: residual {verdict.residual:.1e} of the pressure load, wanted"
+                f" {tolerance:.1e} ({verdict.reason}); raise solver.maximum_iterations"
+            )
+            raise StageFailed(message, state, stiffness, 0)
+        return state
