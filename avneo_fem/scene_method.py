@@ -145,7 +145,7 @@ class Solver(Table):
         " on the first mesh only, and then resolves collisions and takes a few damped iterations",
     )
     approximate_iterations: Annotated[int, Field(ge=1)] = Field(
-        6, description="iterations a level of quality approximate"
+        3, description="iterations a level of quality approximate, on refined meshes"
     )
     tolerance: Positive = Field(
         1e-8, description="final residual relative to the pressure load P x area"
