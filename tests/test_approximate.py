@@ -10,6 +10,7 @@ from avneo_fem.constraints.collision_response import CrossingsRemain
 from avneo_fem.stages import approximate
 from run_cases import SMALL, Run, suture_inside
 
+DEMOS = Path(__file__).parent.parent / "demos"
 #: One refinement, so that there is a finest mesh to be quick on.
 QUICK = SMALL.replace(
     "inside_tolerance = 0.3", 'inside_tolerance = 0.05\nquality = "approximate"'
@@ -67,3 +68,13 @@ def test_crossings_that_remain_are_a_failure(
     assert failure.startswith("refinement: stopped at 0 of 1")
     assert str(CrossingsRemain(3)) in failure
     assert run.report["cusps"][0]["self_intersections"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [1, 3])
+def test_experiments(number: int, tmp_path: Path) -> None:
+    """Truth: the paper's experiments come out inside and free of crossings at the paper's mesh."""
+    text = (DEMOS / f"experiment_{number}.toml").read_text()
+    run = suture_inside(text + '\n[solver]\nquality = "approximate"\n', tmp_path)
+    assert run.report["failures"] == []
+    assert (run.process.returncode, run.report["verified"]) == (0, True)
