@@ -12,6 +12,7 @@ import pytest
 
 from avneo_fem.equilibrium.directors import clamp_rotation
 from avneo_fem.geometry.valve_input import ValveInput
+from avneo_fem.meshing.refine import refine
 from avneo_fem.meshing.triangulate import triangulate_template
 from avneo_fem.results.crossings import self_intersections
 from avneo_fem.results.measures import clamp_error_deg
@@ -411,3 +412,26 @@ def test_without_bending(tmp_path: Path) -> None:
 def test_stage_failed_is_an_error_of_the_solve() -> None:
     """Truth: exit status 1, not 2."""
     assert StageFailed("why", None, 0.0, 0).exit_status == 1
+
+
+def test_going_on_from_a_refined_mesh(tmp_path: Path) -> None:
+    """Truth: the uninterrupted run, also when the process was killed after the triangles were
+    split: the same levels, all on the finer mesh, the same state to 1e-9 mm."""
+
+    def begin(folder: Path, resume: bool = False) -> Done:
+        run = Done(set_up(), folder, resume)
+        finer = [refine(run.setup.mesh, run.setup.cusp.template)]
+        run.suturing = CuspSuturing(run.setup, run.suturing.observer, run.store, finer)
+        return run
+
+    whole = begin(tmp_path / "whole").run()
+    level = whole.names.index("refinement") + 1
+    again = begin(tmp_path / "again", resume=True)
+    again.store.folder.mkdir(parents=True)
+    again.store.path(1).write_bytes(whole.store.files[level - 1])
+    again.run()
+    assert whole.result.failure is None
+    assert untimed(again.result.records) == untimed(whole.result.records)
+    np.testing.assert_allclose(again.result.points, whole.result.points, rtol=0, atol=1e-9)
+    shapes = {shot.points.shape for shot in again.result.snapshots}
+    assert shapes == {whole.result.points.shape}

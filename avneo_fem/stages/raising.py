@@ -57,8 +57,8 @@ class PenaltyRaising(CuspMoves):
         Returns
         -------
         (wall, wedge, clamp, layers)
-            Largest miss of the clearances [mm], sutured nodes apart; within the taper the node
-            need only be inside the root. Clamp: rms angle to the half-plane [degrees].
+            Largest miss of the clearances [mm], sutured and laid nodes apart; within the taper a
+            node need only be inside the root. Clamp: rms angle to the half-plane [degrees].
         """
         setup = self.setup
         free = np.ones(len(points), dtype=bool)
