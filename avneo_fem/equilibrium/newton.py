@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from avneo_fem.compat import PETSc
-from avneo_fem.constraints.term import Term
+from avneo_fem.constraints.term import Foreseen, Term
 from avneo_fem.equilibrium.cusp_system import CuspSystem
 from avneo_fem.equilibrium.factorization import Factorization, FactorizationError
 
@@ -83,7 +83,7 @@ class NewtonSolver:
         self.general = Factorization(symmetric=False)
         # of its own, as its patterns differ: that of the tangent need not be analysed again
         self.ahead = Factorization(symmetric=True)
-        self.iterations, self.hindered, self.looks = 0, 0, 0
+        self.iterations, self.hindered = 0, 0
         self.forget()
         self._base: Floats = np.empty(0)
         self._asked = self._share = 0.0
@@ -171,28 +171,28 @@ class NewtonSolver:
 
     def _with_foresight(self, direction: Floats, force: Floats, matrix: Any) -> Floats:
         """Direction that takes into account which penalties begin or cease to act on its way."""
-        last = None
+        known: Any = 0
         for _ in range(_FORESIGHT):
             step = np.zeros(self.system.model.size)
             step[self._free] = -direction
             found = self.system.foreseen(self._base, step)
-            if found is None:
-                return direction
-            if np.array_equal(found.switched, last if last is not None else 0 * found.switched):
-                return direction
-            last = found.switched
-            self.looks += 1
-            with suppress(FactorizationError):
-                with self._factorizing():
-                    if self.ahead.factorize(matrix + found.hessian[self._free][:, self._free]):
-                        return direction
-                    better = self.ahead.solve(force + found.gradient[self._free])
-                if not np.isfinite(better).all() or better @ force <= 0:
-                    return direction
-                direction = better
-                continue
-            return direction
+            if found is None or (found.switched == known).all():
+                break
+            known = found.switched
+            better = self._ahead(force, matrix, found)
+            if better is None:
+                break
+            direction = better
         return direction
+
+    def _ahead(self, force: Floats, matrix: Any, found: Foreseen) -> Floats | None:
+        """Newton direction with what is foreseen, None when that model is not convex."""
+        with suppress(FactorizationError), self._factorizing():
+            if self.ahead.factorize(matrix + found.hessian[self._free][:, self._free]) == 0:
+                direction = self.ahead.solve(force + found.gradient[self._free])
+                if np.isfinite(direction).all() and direction @ force > 0:
+                    return direction
+        return None
 
     def _factorizing(self) -> AbstractContextManager[None]:
         return self.system.stopwatch.part("factorization")

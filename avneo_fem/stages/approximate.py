@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from avneo_fem.constraints.collision_response import CrossingsRemain, resolve
 from avneo_fem.stages.continuation import StageFailed
-from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.levels import Level
 from avneo_fem.stages.moves import Outcome
 from avneo_fem.stages.suturing import CuspSuturing
@@ -37,9 +36,8 @@ _RESOLVED = 0.1
 class ApproximateSuturing(CuspSuturing):
     """Stages of one cusp in ``solver.quality = "approximate"``."""
 
-    def _prepare(self, setup: CuspSetup) -> None:
-        # what has no room in its half-plane is left as it lies
-        self.levels = [level for level in self.levels if level.name != "first_row"]
+    # what has no room in its half-plane is left as it lies
+    _left_out = ("first_row",)
 
     def _is_quick(self) -> bool:
         return any(self.setup.mesh is mesh for mesh in self.finer)

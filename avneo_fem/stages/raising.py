@@ -8,43 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avneo_fem.stages.continuation import StageFailed
-from avneo_fem.stages.cusp_setup import CuspSetup
-from avneo_fem.stages.levels import Level
-from avneo_fem.stages.moves import SETTLE_DAMPING, CuspMoves
+from avneo_fem.stages.moves import SETTLE_DAMPING
+from avneo_fem.stages.progress import CuspProgress
 
 __all__ = ["PenaltyRaising"]
 
 Floats = NDArray[np.float64]
 
 
-class PenaltyRaising(CuspMoves):
-    """The end of the stages (paper §3.4 step 3).
-
-    Parameters
-    ----------
-    setup : CuspSetup
-        Model, constraints and solver of the present mesh.
-    levels : list of Level
-        What comes before.
-    """
-
-    def __init__(self, setup: CuspSetup, levels: list[Level]) -> None:
-        super().__init__(setup)
-        self.levels = levels
-
-    def _keep(
-        self,
-        state: Floats,
-        name: str,
-        parameter: float,
-        used: int,
-        reason: str,
-        clock: float,
-        steps: int,
-        done: int | None,
-    ) -> None:
-        """Record of a level; see ``CuspSuturing``."""
-        raise NotImplementedError
+class PenaltyRaising(CuspProgress):
+    """The end of the stages (paper §3.4 step 3)."""
 
     def outside(self, points: Floats) -> tuple[float, float]:
         """Largest depth of a node outside the root and outside the contact wedge [mm]."""

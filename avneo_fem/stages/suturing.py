@@ -19,7 +19,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from avneo_fem.constraints.signed_distance_penalty import SignedDistancePenalty
 from avneo_fem.equilibrium.directors import start_directors
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.harmonic import harmonic_extension
@@ -66,6 +65,9 @@ class CuspSuturing(PenaltyRaising):
         What the cusp is called towards observer and store; None: as in the set-up.
     """
 
+    #: stages that a quality does without
+    _left_out: tuple[str, ...] = ()
+
     def __init__(
         self,
         setup: CuspSetup,
@@ -75,15 +77,11 @@ class CuspSuturing(PenaltyRaising):
         index: int | None = None,
     ) -> None:
         lambdas = setup.wedges.levels(setup.scene.contact.steps)
-        super().__init__(setup, levels_of(setup.scene, setup.placement_k, lambdas, finer))
-        self.observer, self.store, self.finer = observer, store, finer
-        self.index = setup.index if index is None else index
-        self.records: list[StageRecord] = []
-        self.snapshots: list[Snapshot] = []
-        self._prepare(setup)
-
-    def _prepare(self, setup: CuspSetup) -> None:
-        """What a quality changes in a fresh set-up."""
+        planned = levels_of(setup.scene, setup.placement_k, lambdas, finer)
+        levels = [level for level in planned if level.name not in self._left_out]
+        name = setup.index if index is None else index
+        super().__init__(setup, levels, observer, store, name)
+        self.finer = finer
 
     def run(self, resume: bool = False) -> CuspResult:
         """Run all stages; a failure is part of the result, with the last good state."""
@@ -149,7 +147,6 @@ class CuspSuturing(PenaltyRaising):
         coarse = self.setup
         points = prolong(coarse.mesh, coarse.system.positions(state))
         self.setup = coarse.on_mesh(self.finer[level.mesh - 1], points)
-        self._prepare(self.setup)
         self.snapshots = [
             Snapshot(
                 shot.name,
@@ -169,41 +166,13 @@ class CuspSuturing(PenaltyRaising):
         mesh = max((level.mesh for level in behind), default=0)
         if mesh:
             self.setup = self.setup.on_mesh(self.finer[mesh - 1], checkpoint.snapshots[-1].points)
-            self._prepare(self.setup)
-        setup = self.setup
         self.records, self.snapshots = checkpoint.records, checkpoint.snapshots
         stiffness = checkpoint.penalty_stiffness
         for term, value in zip(self._penalties(), stiffness, strict=True):
             term.stiffness = value
-        setup.clamp.reference = checkpoint.clamp_reference
+        self.setup.clamp.reference = checkpoint.clamp_reference
         self._set_directors(checkpoint.directors)
         return checkpoint.state
-
-    def _save(
-        self,
-        state: Floats,
-        done: int,
-        finished: bool = False,
-        residual: float = float("nan"),
-        failure: str | None = None,
-    ) -> None:
-        if self.store is None:
-            return
-        setup = self.setup
-        wall, wedge, clamp, layers = (term.stiffness for term in self._penalties())
-        kept = Checkpoint(
-            state=state,
-            directors=self._directors(),
-            levels_done=done,
-            penalty_stiffness=(wall, wedge, clamp, layers),
-            clamp_reference=setup.clamp.reference,
-            records=self.records,
-            snapshots=self.snapshots,
-            finished=finished,
-            residual=residual,
-            failure=failure,
-        )
-        self.store.save(self.index, kept)
 
     def _activate(self, level: Level, parameter: float) -> None:
         """Terms and held unknowns that come with a level; they stay for all later ones.
@@ -268,40 +237,3 @@ class CuspSuturing(PenaltyRaising):
         if failure is not None:
             raise failure
         return state
-
-    def _keep(
-        self,
-        state: Floats,
-        name: str,
-        parameter: float,
-        used: int,
-        reason: str,
-        clock: float,
-        steps: int,
-        done: int | None,
-    ) -> None:
-        """Record and snapshot of a level, and a checkpoint with ``done`` levels behind it."""
-        setup = self.setup
-        residual = setup.system.relative_residual(state)
-        spent = setup.newton.iterations - used
-        seconds = time.perf_counter() - clock
-        record = StageRecord(name, parameter, spent, reason, residual, seconds, steps)
-        points = setup.system.positions(state)
-        self.records.append(record)
-        self.snapshots.append(Snapshot(name, parameter, points, self._fields(points)))
-        if done is not None:
-            self._save(state, done)
-        self.observer(self.index, record)
-
-    def _fields(self, points: Floats) -> dict[str, Floats]:
-        """Distances and penalty pressure at the nodes, for ParaView."""
-        setup = self.setup
-        pressure = np.zeros(len(points))
-        for term in setup.system.terms:
-            if isinstance(term, SignedDistancePenalty):
-                pressure += term.stiffness * term.ramp(points)
-        return {
-            "wall_distance": setup.geometry.root.signed_distance(points),
-            "wedge_distance": setup.wedge.field.evaluate(points)[0],
-            "penalty_pressure": pressure,
-        }
