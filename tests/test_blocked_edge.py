@@ -243,7 +243,8 @@ def row() -> LaidRow:
     tangent, inward = frame[:, 0], frame[:, 1]
     normal = np.cross(tangent, -inward)
     foot, reach = random.standard_normal((3, 3)), np.array([0.002, 0.1, 0.3])
-    return LaidRow(np.arange(3), foot, tangent, inward, normal, reach, np.ones(3, dtype=bool))
+    all_edges = np.ones(3, dtype=bool)
+    return LaidRow(np.arange(3), foot, tangent, inward, normal, reach, all_edges, ~all_edges)
 
 
 def placed(row: LaidRow, radius: np.ndarray, angle: np.ndarray, rest: np.ndarray) -> np.ndarray:

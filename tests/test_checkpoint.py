@@ -23,6 +23,7 @@ def checkpoint(seed: int = 0) -> Checkpoint:
         levels_done=7,
         penalty_stiffness=(32.0, 64.0, 1e4),
         clamp_reference=random.normal(size=3),
+        wedge_clearance=random.normal(size=4),
         records=[StageRecord("boundary", 0.1, 12, "converged", 1e-5, 0.5, 2)],
         snapshots=[Snapshot("boundary", 0.1, points, {"wall_distance": points[:, 0]})],
         finished=True,

@@ -36,6 +36,14 @@ class CuspGeometry:
         """r_asl(gamma(s)), points (n, 3) [mm] (paper §3.2, step 2)."""
         return self.suture_line.point(self.stitching.annulus_arc_length(s_csl))
 
+    def suture_joints(self) -> Array:
+        """Arc lengths (2,) on the template of the ends of the suture line's straight parts [mm].
+
+        Next to the commissures the line is straight (Fig. 7); where it begins to turn, a mesh
+        should have a node: then the row of triangles at the corner meets no bend.
+        """
+        return self.stitching.template_arc_length(self.suture_line.breaks[[1, -2]])
+
     def sutured_tangent(self, s_csl: ArrayLike) -> Array:
         """tau_asl(gamma(s)), unit vectors (n, 3) (paper §3.1)."""
         return self.suture_line.tangent(self.stitching.annulus_arc_length(s_csl))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from avneo_fem.geometry.commissure_plane import CommissurePlane
 from avneo_fem.geometry.planar_wedge import PlanarWedge
+from avneo_fem.geometry.rounded_wedge import RoundedWedge
 
 __all__ = ["ContactWedge"]
 
@@ -21,7 +22,7 @@ class ContactWedge:
 
     Parameters
     ----------
-    section : PlanarWedge
+    section : PlanarWedge or RoundedWedge
         The wedge in the plane of the commissures.
     frame : CommissurePlane
         Plane coordinates: origin in the circumcentre of the commissures, first axis towards A_0.
@@ -30,10 +31,16 @@ class ContactWedge:
         lambda of (3.5), 0 to 1; 1 for contact planes, which have no path.
     """
 
-    section: PlanarWedge
+    section: PlanarWedge | RoundedWedge
     frame: CommissurePlane
     cusp_index: int
     lam: float
+
+    def rounded(self, radius: float) -> ContactWedge:
+        """What a disc of ``radius`` [mm] can reach of this wedge: without kinks up to there."""
+        section = self.section
+        whole = section.section if isinstance(section, RoundedWedge) else section
+        return replace(self, section=RoundedWedge(whole, radius))
 
     def signed_distance(self, points: Array) -> Array:
         """Signed distance (n,) [mm] of points (n, 3), positive on the cusp's own side."""

@@ -109,3 +109,9 @@ class StitchingMap:
         knots = [0.0, first, last, self.csl_length]
         values = [0.0, first, self.asl_length - first, self.asl_length]
         return np.asarray(np.interp(length, knots, values))
+
+    def template_arc_length(self, s: ArrayLike) -> Array:
+        """gamma^-1: arc length (n,) on the CSL of arc lengths (n,) on the ASL [mm]."""
+        first, last = self.breaks
+        knots = [0.0, first, self.asl_length - first, self.asl_length]
+        return np.interp(np.asarray(s, dtype=float), knots, [0.0, first, last, self.csl_length])

@@ -15,6 +15,8 @@ __all__ = ["nested_meshes", "prolong", "refine"]
 
 Floats = NDArray[np.float64]
 
+_NOWHERE: Floats = np.empty(0)
+
 
 def refine(mesh: CuspMesh, template: TemplateOutline) -> CuspMesh:
     """Split every triangle of a mesh into four.
@@ -45,11 +47,16 @@ def refine(mesh: CuspMesh, template: TemplateOutline) -> CuspMesh:
 
 
 def nested_meshes(
-    template: TemplateOutline, size: float, refinements: int, fewer_will_do: bool = True
+    template: TemplateOutline,
+    size: float,
+    refinements: int,
+    fewer_will_do: bool = True,
+    joints: Floats = _NOWHERE,
 ) -> list[CuspMesh]:
     """Meshes of a template, each a refinement of the one before, the last of edge length ``size``.
 
-    With ``fewer_will_do`` the first mesh is made finer where the template is too small for it.
+    With ``fewer_will_do`` the first mesh is made finer where the template is too small for it;
+    ``joints`` are arc lengths (j,) of the suture line where a node is wanted [mm].
 
     Raises
     ------
@@ -57,7 +64,7 @@ def nested_meshes(
         When the first mesh is too coarse for the template.
     """
     try:
-        meshes = [triangulate_template(template, size * 2.0**refinements)]
+        meshes = [triangulate_template(template, size * 2.0**refinements, joints)]
     except SceneError as error:
         if refinements == 0:
             raise
@@ -68,7 +75,7 @@ def nested_meshes(
                 f"the first mesh, {size * 2.0**refinements:.3g} mm, is too coarse: {error.valid};"
                 " take fewer, or leave it out",
             ) from None
-        return nested_meshes(template, size, refinements - 1)
+        return nested_meshes(template, size, refinements - 1, joints=joints)
     for _ in range(refinements):
         meshes.append(refine(meshes[-1], template))
     return meshes

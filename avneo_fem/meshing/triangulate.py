@@ -16,6 +16,8 @@ __all__ = ["TemplateOutline", "triangulate_template"]
 
 Floats = NDArray[np.float64]
 
+_NOWHERE: Floats = np.empty(0)
+
 
 class _Path(Protocol):
     @property
@@ -41,9 +43,29 @@ def _divide(breaks: Floats, size: float) -> Floats:
     return np.r_[np.concatenate(parts), breaks[-1]]
 
 
-def triangulate_template(template: TemplateOutline, size: float) -> CuspMesh:
+def _with_joints(breaks: Floats, joints: Floats, size: float) -> Floats:
+    """Breaks and those joints that leave no piece shorter than half of ``size``."""
+    for joint in joints:
+        if np.abs(breaks - joint).min() >= size / 2:
+            breaks = np.sort(np.r_[breaks, joint])
+    return breaks
+
+
+def triangulate_template(
+    template: TemplateOutline, size: float, joints: Floats = _NOWHERE
+) -> CuspMesh:
     """Mesh a template with target edge length ``size`` [mm].
 
+    Parameters
+    ----------
+    template : TemplateOutline
+    size : float
+    joints : (j,) array
+        Arc lengths on its suture line [mm] where a node is wanted; one that would make an edge
+        shorter than half of ``size`` is left out.
+
+    Notes
+    -----
     The boundary is divided evenly in arc length between the joints of its curves, so boundary
     nodes lie on the curves to rounding; gmsh fills the inside (frontal Delaunay).
 
@@ -52,7 +74,8 @@ def triangulate_template(template: TemplateOutline, size: float) -> CuspMesh:
     SceneError
         When ``mesh.size`` is too large for the template (fewer than 6 pieces of suture line).
     """
-    suture = _divide(np.asarray(template.suture_line.breaks), size)
+    breaks = _with_joints(np.asarray(template.suture_line.breaks), joints, size)
+    suture = _divide(breaks, size)
     free = _divide(np.asarray(template.free_edge.breaks), size)
     if len(suture) < 7:
         largest = float(template.suture_line.breaks[-1]) / 8

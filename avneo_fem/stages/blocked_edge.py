@@ -43,6 +43,9 @@ class LaidRow:
         Distance from the suture line that the clearance allows [mm].
     is_blocked : (k-1,) bool array
         Suture edges whose triangle this is about.
+    is_left : (k-1,) bool array
+        Suture edges that have no room either, but whose node, at the free edge, cannot be laid
+        down without cutting a bend of the suture line: they are free to turn.
     """
 
     nodes: Ints
@@ -52,6 +55,12 @@ class LaidRow:
     normal: Floats
     reach: Floats
     is_blocked: NDArray[np.bool_]
+    is_left: NDArray[np.bool_]
+
+    @property
+    def has_room(self) -> NDArray[np.bool_]:
+        """(k-1,) suture edges whose triangle can follow its half-plane."""
+        return ~(self.is_blocked | self.is_left)
 
     def on_the_way(self, points: Floats, share: float) -> Floats:
         """(j, 3) places of nodes at ``points`` (j, 3) after ``share`` of their way.
@@ -124,8 +133,9 @@ def blocked_row(
     room = np.maximum(clear.sum(axis=1) / _SAMPLES * height, slack)
     blocked = (room < _ROOM * height) & ~np.isin(apex, mesh.suture_line)
     length = np.linalg.norm(along, axis=1)
-    # a node that has to stay at the free edge cannot go near the next bend: then it is left free
-    blocked &= ~at_free_edge | (_bends(tangent) * length <= room)
+    # a node that has to stay at the free edge cannot go near the next bend
+    left = blocked & at_free_edge & (_bends(tangent) * length > room)
+    blocked &= ~left
     order = np.flatnonzero(blocked)[np.argsort(room[blocked], kind="stable")]
     nodes, first = np.unique(apex[order], return_index=True)
     edge = order[first]
@@ -140,7 +150,7 @@ def blocked_row(
     along = tangent[edge] - np.einsum("jd,jd->j", tangent[edge], way)[:, None] * way
     along /= np.linalg.norm(along, axis=1)[:, None]
     laid = np.isin(apex, nodes)
-    return LaidRow(nodes, foot[edge], along, way, np.cross(along, -way), reach, laid)
+    return LaidRow(nodes, foot[edge], along, way, np.cross(along, -way), reach, laid, left & ~laid)
 
 
 def _cleared_of_bends(share: Floats, tangent: Floats, length: Floats, room: Floats) -> Floats:

@@ -16,7 +16,7 @@ from avneo_fem.equilibrium.cusp_system import CuspSystem
 from avneo_fem.equilibrium.newton import NewtonSettings, NewtonSolver
 from avneo_fem.equilibrium.relaxation import Relaxation, RelaxationSettings
 from avneo_fem.equilibrium.shell_model import ShellModel, ShellParameters
-from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.contact_wedge import ContactWedge, ContactWedgeFamily
 from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.scene import Scene
@@ -90,6 +90,9 @@ class CuspSetup:
         Where the sutured nodes go.
     conormal : (k-1, 3) array
         Prescribed outward conormal b of the suture edges.
+    wedge_clearance : (n,) array
+        d_0 that the surface must keep from the contact wedge [mm]; ``wedge.clearance``, that of
+        the nodes, may become more.
     """
 
     def __init__(
@@ -111,10 +114,12 @@ class CuspSetup:
         middles = (mesh.suture_arc_length[1:] + mesh.suture_arc_length[:-1]) / 2
         self.conormal = self.cusp.sutured_conormal(middles)
         self.wall, self.wedge = self._penalties()
+        self.wedge_clearance = self.wedge.clearance
+        self.wedge.field = self.wedge_field(0.0)
         self.clamp = self._clamp()
         self.layers = self._layers()
         self.row = self._blocked_row()
-        self.clamp.active = ~self.row.is_blocked
+        self.clamp.active = self.row.has_room
         membrane = scene.material.young_modulus * self.cusp.thickness
         self.contact = self._self_contact(membrane)
         self.system = CuspSystem(self.model, self.contact)
@@ -132,6 +137,11 @@ class CuspSetup:
         other.layers.stiffness = self.layers.stiffness
         other.wedge.field = self.wedge.field
         return other
+
+    def wedge_field(self, lam: float) -> ContactWedge:
+        """Contact wedge of lambda, its corners rounded as far as the penalty acts."""
+        reach = float(self.wedge.clearance.max()) + self.wedge.width / 2
+        return self.wedges.wedge(self.index, lam).rounded(reach)
 
     def _place(self) -> tuple[Floats, int]:
         plane, scene, i = self.geometry.commissures, self.scene, self.index

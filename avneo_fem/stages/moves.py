@@ -29,6 +29,8 @@ _FIRST_PRESSURE = 0.05
 #: first dampings, in units of E H / R^2
 _BOUNDARY_DAMPING, SETTLE_DAMPING = 1.5, 0.6
 _BOUNDARY_ITERATIONS = 6
+#: iterations after a part of the way to the line of a finer mesh
+_REST_ITERATIONS = 40
 
 
 class CuspMoves:
@@ -127,10 +129,15 @@ class CuspMoves:
     def _follow_mesh(self, state: Floats, start: float, stop: float) -> Outcome:
         """Move the new sutured nodes to their line; once there, clamp them and settle."""
         moved, reason = self._move(state, start, stop)
-        if moved is None or stop < 1.0:
+        if moved is None:
+            return None, reason
+        if stop < 1.0:
+            # a layer is in the way: it must get out of it before the next step
+            relaxation, tolerance = self.setup.relaxation, self.options.path_tolerance
+            moved, _ = relaxation.settle(moved, tolerance, SETTLE_DAMPING, _REST_ITERATIONS)
             return moved, reason
         # ``_move`` has left no crossing behind
-        return self._settle(moved, self._turned(moved, ~self.setup.row.is_blocked, 1.0))
+        return self._settle(moved, self._turned(moved, self.setup.row.has_room, 1.0))
 
     def _turned(self, state: Floats, chosen: NDArray[np.bool_], share: float) -> Floats:
         """State with chosen suture edges (k-1,) turned by a share of what is missing to the
@@ -148,7 +155,7 @@ class CuspMoves:
 
         The penalty that takes the triangles along grows with it, by a factor of 4 a level.
         """
-        setup, free = self.setup, ~self.setup.row.is_blocked
+        setup, free = self.setup, self.setup.row.has_room
         trial = self._turned(state, free, (stop - start) / (1.0 - start))
         full, count = setup.scene.clamp.stiffness, self.options.clamp_steps
         setup.clamp.stiffness = full * 4.0 ** (count * (stop - 1.0))
@@ -172,5 +179,5 @@ class CuspMoves:
         return self._settle(state, self._turned(trial, row.is_blocked, share))
 
     def _close_wedge(self, state: Floats, _start: float, stop: float) -> Outcome:
-        self.setup.wedge.field = self.setup.wedges.wedge(self.setup.index, max(stop, 0.0))
+        self.setup.wedge.field = self.setup.wedge_field(max(stop, 0.0))
         return self._settle(state, state)

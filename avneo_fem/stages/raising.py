@@ -7,6 +7,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from avneo_fem.constraints.between_nodes import shortfall_between
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.moves import SETTLE_DAMPING
 from avneo_fem.stages.progress import CuspProgress
@@ -16,8 +17,14 @@ __all__ = ["PenaltyRaising"]
 Floats = NDArray[np.float64]
 
 
+#: times at most that nodes are moved off because of what lies between them
+_ROUNDS = 8
+
+
 class PenaltyRaising(CuspProgress):
     """The end of the stages (paper §3.4 step 3)."""
+
+    _kept_off = 0
 
     def outside(self, points: Floats) -> tuple[float, float]:
         """Largest depth of a node outside the root and outside the contact wedge [mm]."""
@@ -49,6 +56,40 @@ class PenaltyRaising(CuspProgress):
             setup.layers.shortfall(points),
         )
 
+    def _bulging(self, points: Floats) -> Floats:
+        """(n,) by how much the edges at a node miss the clearance from the wedge between nodes.
+
+        Nodes that are held, and edges between them, apart: the stitch puts them there.
+        """
+        setup, edges = self.setup, self.setup.mesh.edges
+        held = np.zeros(len(points), dtype=bool)
+        held[setup.mesh.suture_line] = held[setup.row.nodes] = True
+        edges = edges[~held[edges].all(axis=1)]
+        short = shortfall_between(setup.wedge.field, points, edges, setup.wedge_clearance)
+        result = np.zeros(len(points))
+        for ends in edges.T:
+            np.maximum.at(result, ends, short)
+        return np.where(held, 0.0, result)
+
+    def _keep_off(self, points: Floats, allowed: float) -> bool:
+        """Ask more clearance of nodes between which the surface is short of it.
+
+        Whether there were any; a node is not moved off by more than half a triangle.
+        """
+        setup = self.setup
+        if self._kept_off == _ROUNDS:
+            return False  # whether what is left matters, the verification says
+        more = self._bulging(points)
+        before = setup.wedge.clearance
+        most = setup.wedge_clearance + setup.scene.mesh_size / 2
+        after = np.minimum(np.where(more > allowed, before + more, before), most)
+        if np.array_equal(before, after):
+            return False
+        self._kept_off += 1
+        setup.wedge.clearance = after
+        setup.wedge.field = setup.wedge_field(1.0)
+        return True
+
     def _raise_until_inside(self, state: Floats) -> Floats:
         """Raise the penalties until clearances and clamp hold, then converge (§3.4 step 3)."""
         setup, scene = self.setup, self.setup.scene
@@ -67,10 +108,15 @@ class PenaltyRaising(CuspProgress):
         while True:
             misses = self.shortfalls(setup.system.positions(state))
             late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
+            if not any(late) and self._keep_off(setup.system.positions(state), inside):
+                state = self._converge(state, "root_wall", self.options.path_tolerance)
+                continue
             if not any(late):
                 state = self._converge(state, "equilibrium", self.options.tolerance)
-                misses = self.shortfalls(setup.system.positions(state))
-                if all(miss <= most for miss, most in zip(misses, allowed, strict=True)):
+                points = setup.system.positions(state)
+                misses = self.shortfalls(points)
+                kept = all(miss <= most for miss, most in zip(misses, allowed, strict=True))
+                if kept and not self._keep_off(points, inside):
                     return state
                 continue
             raised = False

@@ -171,6 +171,7 @@ class CuspSuturing(PenaltyRaising):
         for term, value in zip(self._penalties(), stiffness, strict=True):
             term.stiffness = value
         self.setup.clamp.reference = checkpoint.clamp_reference
+        self.setup.wedge.clearance = checkpoint.wedge_clearance
         self._set_directors(checkpoint.directors)
         return checkpoint.state
 
@@ -184,16 +185,17 @@ class CuspSuturing(PenaltyRaising):
             # from here on the cusp must not slip behind its own sutured edge
             setup.system.terms = [setup.wall]
         elif name == "clamped_edge":
-            setup.system.fix(setup.model.angle_dofs[self._suture_edges(~setup.row.is_blocked)])
+            setup.system.fix(setup.model.angle_dofs[self._suture_edges(setup.row.has_room)])
             setup.system.terms = [setup.wall, setup.clamp]
         elif name == "contact_wedge":
             clamp = [setup.clamp] if setup.scene.material.bending else []
             setup.system.terms = [setup.wall, *clamp, setup.wedge]
-            setup.wedge.field = setup.wedges.wedge(setup.index, max(parameter, 0.0))
+            setup.wedge.field = setup.wedge_field(max(parameter, 0.0))
         elif name == "first_row":
-            setup.system.fix(setup.model.angle_dofs[setup.mesh.suture_edges])
+            held = ~setup.row.is_left
+            setup.system.fix(setup.model.angle_dofs[self._suture_edges(held)])
             setup.system.fix(setup.model.position_dofs[setup.row.nodes])
-            setup.clamp.active[:] = True
+            setup.clamp.active = held
         if name not in ("placement", "boundary"):
             setup.model.pressure = setup.scene.diastolic_pressure
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from avneo_fem.compat import MPI, clear_stale_kernels
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.refine import nested_meshes
-from avneo_fem.scene import Template
 from avneo_fem.stages.approximate import ApproximateSuturing
 from avneo_fem.stages.checkpoint import CheckpointStore
 from avneo_fem.stages.cusp_setup import CuspSetup
@@ -20,21 +21,38 @@ from avneo_fem.valve.congruence import representatives, rotate_result, to_its_pl
 __all__ = ["mesh_templates", "suture_valve"]
 
 
-def mesh_templates(given: ValveInput) -> dict[Template, list[CuspMesh]]:
-    """Nested meshes of every different template, from coarse to fine; the same on all ranks.
+def mesh_templates(given: ValveInput) -> list[list[CuspMesh]]:
+    """Nested meshes of every cusp, from coarse to fine; the same on all ranks.
+
+    Cusps of equal templates, suture lines and stitching share theirs.
 
     Raises
     ------
     SceneError
         When ``mesh.size`` is too large for one of them.
     """
-    meshes: dict[Template, list[CuspMesh]] = {}
-    for table, cusp in zip(given.scene.cusp, given.geometry.cusps, strict=True):
-        if table.template not in meshes:
-            scene = given.scene
-            meshes[table.template] = nested_meshes(
-                cusp.template, scene.mesh_size, scene.refinements, scene.mesh.refinements is None
+    scene, meshes = given.scene, []
+    known: list[tuple[Any, Any, list[CuspMesh]]] = []
+    for table, cusp in zip(scene.cusp, given.geometry.cusps, strict=True):
+        joints = cusp.suture_joints()
+        # to rounding: congruent suture lines are not computed at the same place
+        same = [
+            mesh
+            for template, of_them, mesh in known
+            if template == table.template and np.allclose(of_them, joints, rtol=1e-9, atol=0.0)
+        ]
+        meshes.append(
+            same[0]
+            if same
+            else nested_meshes(
+                cusp.template,
+                scene.mesh_size,
+                scene.refinements,
+                scene.mesh.refinements is None,
+                joints,
             )
+        )
+        known.append((table.template, joints, meshes[-1]))
     return meshes
 
 
@@ -45,7 +63,7 @@ def suture_valve(
     resume: bool = False,
     only: int | None = None,
     comm: Any = MPI.COMM_WORLD,
-    meshes: dict[Template, list[CuspMesh]] | None = None,
+    meshes: list[list[CuspMesh]] | None = None,
 ) -> list[CuspResult]:
     """Run the stages of every cusp.
 
@@ -64,7 +82,7 @@ def suture_valve(
         Just this cusp.
     comm : MPI communicator
         Cusps are dealt out to its ranks.
-    meshes : dict or None
+    meshes : list or None
         What :func:`mesh_templates` gives, if at hand.
 
     Returns
@@ -86,7 +104,7 @@ def suture_valve(
     for number, index in enumerate(to_solve):
         if number % comm.size != comm.rank:
             continue
-        first, *finer = meshes[scene.cusp[index].template]
+        first, *finer = meshes[index]
         own = given.seen_from(index)
         setup = CuspSetup(own.scene, own.geometry, own.wedges, 0, first)
         stages = CuspSuturing if scene.solver.quality == "equilibrium" else ApproximateSuturing
