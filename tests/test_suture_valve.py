@@ -105,8 +105,8 @@ def test_one_cusp_only(pretend: Any, size: int, only: int) -> None:
 
 
 def test_meshes() -> None:
-    """Truth: cusps that are stitched alike share a mesh, others have their own; a size too large for
-    one of them is an error of the scene."""
+    """Truth: cusps that are stitched alike share a mesh, others have their own; a size too large
+    for one of them is an error of the scene."""
     given = ValveInput.from_scene(parse_scene({"mesh": {"size": 3.0}} | UNEQUAL))
     meshes = mesh_templates(given)
     assert [meshes[index] is meshes[0] for index in range(3)] == [
