@@ -12,13 +12,43 @@ from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.moves import SETTLE_DAMPING
 from avneo_fem.stages.progress import CuspProgress
 
-__all__ = ["PenaltyRaising"]
+__all__ = ["PenaltyRaising", "raising_factor"]
 
 Floats = NDArray[np.float64]
 
 
 #: times at most that nodes are moved off because of what lies between them
 _ROUNDS = 8
+#: share of the tolerance that may be missing between nodes
+_BETWEEN = 0.8
+
+
+def raising_factor(
+    now: tuple[float, float], most: float, before: tuple[float, float] | None, largest: float
+) -> float:
+    """By how much to raise a penalty; no more than is missing, as stiff penalties cost digits.
+
+    Parameters
+    ----------
+    now, before : (float, float)
+        Stiffness and what is missed with it, now and when it was raised last.
+    most : float
+        What may be missed.
+    largest : float
+        Largest factor.
+
+    Returns
+    -------
+    float
+        Miss / allowed where a miss goes with 1/stiffness, as that of a single node does; where
+        the last raise helped less, as a clamp's that whole folds pull at, more. 30 % on top.
+    """
+    power = 1.0
+    if before is not None:
+        gained = np.log(before[1] / now[1]) / np.log(now[0] / before[0])
+        power = float(np.clip(gained, 1e-2, 1.0))
+    wanted = np.log(1.3) + np.log(now[1] / most) / power
+    return largest if wanted >= np.log(largest) else float(np.exp(wanted))
 
 
 class PenaltyRaising(CuspProgress):
@@ -71,7 +101,7 @@ class PenaltyRaising(CuspProgress):
             np.maximum.at(result, ends, short)
         return np.where(held, 0.0, result)
 
-    def _keep_off(self, points: Floats, allowed: float) -> bool:
+    def _keep_off(self, points: Floats) -> bool:
         """Ask more clearance of nodes between which the surface is short of it.
 
         Whether there were any; a node is not moved off by more than half a triangle.
@@ -79,6 +109,7 @@ class PenaltyRaising(CuspProgress):
         setup = self.setup
         if self._kept_off == _ROUNDS:
             return False  # whether what is left matters, the verification says
+        allowed = _BETWEEN * setup.scene.inside_tolerance(setup.cusp.thickness)
         more = self._bulging(points)
         before = setup.wedge.clearance
         most = setup.wedge_clearance + setup.scene.mesh_size / 2
@@ -105,10 +136,11 @@ class PenaltyRaising(CuspProgress):
             scene.clamp.maximum_stiffness,
             scene.layers.maximum_stiffness,
         )
+        tried: dict[int, tuple[float, float]] = {}
         while True:
             misses = self.shortfalls(setup.system.positions(state))
             late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
-            if not any(late) and self._keep_off(setup.system.positions(state), inside):
+            if not any(late) and self._keep_off(setup.system.positions(state)):
                 state = self._converge(state, "root_wall", self.options.path_tolerance)
                 continue
             if not any(late):
@@ -116,17 +148,18 @@ class PenaltyRaising(CuspProgress):
                 points = setup.system.positions(state)
                 misses = self.shortfalls(points)
                 kept = all(miss <= most for miss, most in zip(misses, allowed, strict=True))
-                if kept and not self._keep_off(points, inside):
+                if kept and not self._keep_off(points):
                     return state
                 continue
             raised = False
-            for term, limit, miss, most in zip(
-                self._penalties(), limits, misses, allowed, strict=True
+            for number, (term, limit, miss, most) in enumerate(
+                zip(self._penalties(), limits, misses, allowed, strict=True)
             ):
                 if miss > most and term.stiffness < limit:
-                    # no more than is missing: stiff penalties cost digits
-                    factor = min(scene.wall.growth, 1.3 * miss / most)
+                    now = (term.stiffness, miss)
+                    factor = raising_factor(now, most, tried.get(number), scene.wall.growth)
                     term.stiffness = min(limit, factor * term.stiffness)
+                    tried[number] = now
                     raised = True
             if not raised:
                 state = self._converge(state, "equilibrium", self.options.tolerance)
