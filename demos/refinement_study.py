@@ -482,9 +482,7 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     sizes = sorted(set(asked.sizes), reverse=True)
     try:
-        scene = load_scene(asked.scene)
-        solver = scene.solver.model_copy(update={"quality": "equilibrium"})
-        scene = scene.model_copy(update={"solver": solver, "fidelity": "standard"})
+        scene = load_scene(asked.scene, "standard", ["solver.quality=equilibrium"])
         given = ValveInput.from_scene(scene)
         asked.out.mkdir(parents=True, exist_ok=True)
         runs = [reported(suture(scene, size)) for size in sizes]
