@@ -42,7 +42,7 @@ FIDELITIES: dict[str, Fidelity] = {
     "draft": Fidelity(
         2.0,
         "sizing at the screen: no crossing, and inside; no equilibrium is claimed",
-        {"solver": {"quality": "approximate"}},
+        {"solver": {"quality": "approximate", "boundary_steps": 10}},
     ),
     "standard": Fidelity(1.0, "the paper's mesh, in equilibrium"),
     "fine": Fidelity(0.7, "about twice the triangles"),

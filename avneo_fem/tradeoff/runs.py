@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import resource
 import shutil
 import subprocess
 import sys
@@ -24,7 +25,7 @@ from avneo_fem.results.writing import written_whole
 from avneo_fem.scene import load_scene
 from avneo_fem.tradeoff.settings import Setting
 
-__all__ = ["Run", "Study", "run_setting"]
+__all__ = ["Run", "Study", "kept_run", "run_setting"]
 
 
 @dataclass(frozen=True)
@@ -32,13 +33,15 @@ class Run:
     """One run of a setting that has ended.
 
     ``status`` is its exit status, None when it was stopped at the time limit; ``message`` its last
-    line; ``seconds`` its wall clock; ``key`` says of what scene and version it was.
+    line; ``seconds`` its wall clock and ``cpu_seconds`` its processor time, which other processes
+    on the machine disturb less; ``key`` says of what scene and version it was.
     """
 
     setting: str
     repeat: int
     status: int | None
     seconds: float
+    cpu_seconds: float
     message: str
     key: str
     folder: Path
@@ -147,17 +150,23 @@ def run_setting(
     except OSError as error:
         reason = f"cannot be used ({error.strerror})"
         raise SceneError("output folder", str(study.folder), reason) from None
-    clock = time.perf_counter()
+    clock, used = time.perf_counter(), _children_seconds()
     status, told = (execute or _process)(command, study.limit)
-    seconds = time.perf_counter() - clock
+    seconds, used = time.perf_counter() - clock, _children_seconds() - used
     shutil.rmtree(folder / "checkpoints", ignore_errors=True)
     lines = told.strip().splitlines()
     message = f"stopped after {seconds:.0f} s" if status is None else (lines or [""])[-1]
-    run = Run(setting.name, repeat, status, seconds, message, key, folder)
+    run = Run(setting.name, repeat, status, seconds, used, message, key, folder)
     with written_whole(folder / "run.json") as temporary:
         data = {name: value for name, value in asdict(run).items() if name != "folder"}
         temporary.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     return run
+
+
+def _children_seconds() -> float:
+    """Processor time of all processes that were started here and have ended [s]."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _process(command: Sequence[str], limit: float | None) -> tuple[int | None, str]:

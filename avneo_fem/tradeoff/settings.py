@@ -10,7 +10,14 @@ from dataclasses import dataclass
 from avneo_fem.errors import SceneError
 from avneo_fem.scene import FIDELITIES, Scene
 
-__all__ = ["REFERENCE", "SECOND_PATH", "Setting", "chosen_settings", "default_settings"]
+__all__ = [
+    "REFERENCE",
+    "SECOND_PATH",
+    "Setting",
+    "chosen_settings",
+    "default_settings",
+    "second_path",
+]
 
 #: What the others are measured against, and the same reached another way.
 REFERENCE, SECOND_PATH = "reference", "reference, second path"
