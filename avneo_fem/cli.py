@@ -188,12 +188,14 @@ def tradeoff(
 ) -> None:
     """Error against time: run a set of settings and measure them against the reference."""
     from avneo_fem.geometry.valve_input import ValveInput
+
+    loaded = load_scene(scene, overrides=set_ or ())
+    ValveInput.from_scene(loaded)
+    from avneo_fem.tradeoff.plot import PictureError
     from avneo_fem.tradeoff.runs import Study
     from avneo_fem.tradeoff.settings import REFERENCE
     from avneo_fem.tradeoff.study import evaluate, plan, run_study, write_study
 
-    loaded = load_scene(scene, overrides=set_ or ())
-    ValveInput.from_scene(loaded)
     folder = Path("out") / f"{loaded.name}-tradeoff" if output is None else output
     study = Study(scene, folder, tuple(set_ or ()), limit)
     chosen = plan(study, settings or ())
@@ -203,8 +205,11 @@ def tradeoff(
         _people.print("[bold red]avneo:[/] interrupted; --resume goes on from the last run")
         raise typer.Exit(130) from None
     outcome = evaluate(runs, target)
-    write_study(folder, outcome, f"{loaded.name}: error against time")
-    _people.print(f"written: {escape(str(folder))}/tradeoff.csv, tradeoff.png")
+    try:
+        write_study(folder, outcome, f"{loaded.name}: error against time")
+    except PictureError as error:
+        _people.print(f"[yellow]{escape(str(error))}[/]")
+    _people.print(f"written: {escape(str(folder))}")
     _people.print(f"[bold]advice:[/] {escape(outcome.advice)}")
     if not any(row.name == REFERENCE and row.verified for row in outcome.rows):
         raise typer.Exit(1)

@@ -91,7 +91,8 @@ def advice(rows: Sequence[Row], scatter: Errors | None, target: float | None = N
         limits = f"equally fine solutions differ by {floor:.2f} mm, so less cannot be told apart"
     nearest = min(usable(rows), key=lambda row: (_mean(row), row.cpu_seconds))
     if target is None:
-        target = math.ceil(10 * (_mean(nearest) if floor is None else floor) - 1e-9) / 10
+        least = _mean(nearest) if floor is None else floor
+        target = max(0.1, math.ceil(round(10 * least, 6)) / 10)
     if floor is not None and target < floor:
         return f"no advice for {target:g} mm: {limits}"
     near = [row for row in usable(rows) if _mean(row) <= target]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from avneo_fem.results.pictures import PictureError
 from avneo_fem.results.writing import written_whole
 from avneo_fem.scene import FIDELITIES
 from avneo_fem.tradeoff.advice import front
@@ -12,7 +13,7 @@ from avneo_fem.tradeoff.measured import Errors
 from avneo_fem.tradeoff.rows import Row
 from avneo_fem.tradeoff.settings import SECOND_PATH
 
-__all__ = ["draw_tradeoff"]
+__all__ = ["PictureError", "draw_tradeoff"]
 
 _DEFAULT = "standard"
 
@@ -25,13 +26,15 @@ def draw_tradeoff(path: Path, rows: Sequence[Row], scatter: Errors | None, title
 
     Raises
     ------
-    ImportError
+    PictureError
         Without matplotlib.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
-
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+        from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+    except ImportError as error:
+        raise PictureError(f"{path}: no picture without matplotlib ({error})") from error
     figure = Figure(figsize=(11, 5.5), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
