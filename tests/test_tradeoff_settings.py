@@ -16,15 +16,14 @@ from avneo_fem.tradeoff.settings import (
     second_path,
 )
 
-STANDARD, FINEST = Scene(), Scene(fidelity="reference")
-DEFAULTS = default_settings(FINEST, STANDARD)
+DEFAULTS = default_settings(Scene())
 
 
 def test_default_settings() -> None:
-    """Truth: the four fidelities and the reference's second path are there; every setting makes a
-    scene, no two the same one, and no two share a folder."""
+    """Truth: the four fidelities are there; every setting makes a scene, no two the same one, and
+    no two share a folder."""
     names = [setting.name for setting in DEFAULTS]
-    assert set(names) > {*FIDELITIES, SECOND_PATH}
+    assert set(names) > set(FIDELITIES)
     scenes = [parse_scene(overridden({}, parse_overrides(s.overrides))) for s in DEFAULTS]
     assert all(a != b for k, a in enumerate(scenes) for b in scenes[:k])
     slugs = [setting.slug for setting in DEFAULTS]
@@ -36,7 +35,7 @@ def test_changes_that_change_nothing_are_left_out() -> None:
     """Truth: a scene without bending has no variant without it, one that starts on its last mesh
     none that starts on a finer one."""
     plain = parse_scene({"material": {"bending": False}, "mesh": {"refinements": 0}})
-    names = [setting.name for setting in default_settings(plain, plain)]
+    names = [setting.name for setting in default_settings(plain)]
     assert not [name for name in names if "bending" in name or "first mesh" in name]
 
 
@@ -45,17 +44,21 @@ def test_second_path(size: float, other: int) -> None:
     """Truth: one refinement fewer (of 3 at h = 0.35, 1 at 1.5), or one where there is none."""
     scene = parse_scene({"fidelity": "reference", "mesh": {"size": size}})
     assert scene.refinements == {0.7: 3, 3.0: 1, 7.0: 0}[size]
-    assert second_path(scene).overrides == ("fidelity=reference", f"mesh.refinements={other}")
+    found = second_path(Setting(REFERENCE, ("fidelity=reference",)), scene)
+    assert found == Setting(SECOND_PATH, ("fidelity=reference", f"mesh.refinements={other}"))
 
 
 def test_chosen_settings() -> None:
-    """Truth: by name or as entries, in the order asked for, with the reference's two always."""
+    """Truth: by name or as entries, in the order asked for, with the reference always, and by
+    entries of its own where they are given."""
     texts = ["standard", "mine: contact.steps=5  solver.quality=\"approximate\" x='a b'"]
     found = chosen_settings(texts, DEFAULTS)
     mine = Setting("mine", ("contact.steps=5", "solver.quality=approximate", "x=a b"))
-    assert [setting.name for setting in found] == ["standard", "mine", REFERENCE, SECOND_PATH]
+    assert [setting.name for setting in found] == ["standard", "mine", REFERENCE]
     assert found[1] == mine
-    assert [s.name for s in chosen_settings([REFERENCE], DEFAULTS)] == [REFERENCE, SECOND_PATH]
+    assert [s.name for s in chosen_settings([REFERENCE], DEFAULTS)] == [REFERENCE]
+    own = chosen_settings(["reference: mesh.size=0.5"], DEFAULTS)
+    assert own == [Setting(REFERENCE, ("mesh.size=0.5",))]
 
 
 @pytest.mark.parametrize(
@@ -68,6 +71,7 @@ def test_chosen_settings() -> None:
         (["draft", "draft"], "once"),
         (["a b: x=1", "a-b: x=2"], "once"),
         (["?: x=1"], "with letters"),
+        ([f"{SECOND_PATH}: x=1"], "choose another name"),
     ],
 )
 def test_bad_settings(texts: list[str], why: str) -> None:

@@ -47,25 +47,23 @@ def _fidelity(name: str) -> Setting:
     return Setting(name, (f"fidelity={name}",))
 
 
-def second_path(reference: Scene) -> Setting:
+def second_path(reference: Setting, scene: Scene) -> Setting:
     """The reference from another first mesh: as fine, but another triangulation and way there.
 
-    One refinement fewer than the reference's, or one more where it has none.
+    One refinement fewer than the reference's ``scene``, or one more where it has none.
     """
-    usual = reference.refinements
+    usual = scene.refinements
     other = usual - 1 if usual else 1
-    return Setting(SECOND_PATH, (f"fidelity={REFERENCE}", f"mesh.refinements={other}"))
+    return Setting(SECOND_PATH, (*reference.overrides, f"mesh.refinements={other}"))
 
 
-def default_settings(reference: Scene, standard: Scene) -> list[Setting]:
-    """The four fidelities, one change of ``standard`` or ``draft`` at a time, and the reference
-    once more.
+def default_settings(standard: Scene) -> list[Setting]:
+    """The four fidelities, and one change of them at a time.
 
     Parameters
     ----------
-    reference, standard : Scene
-        The scene at these fidelities: a change that a scene already has, or that makes no
-        difference to it, is left out.
+    standard : Scene
+        The scene at fidelity ``standard``: a change that makes no difference to it is left out.
     """
     fewer = max(standard.refinements - 1, 0)
     variants = [
@@ -85,17 +83,17 @@ def default_settings(reference: Scene, standard: Scene) -> list[Setting]:
         variants = [v for v in variants if "material.bending=false" not in v.overrides]
     if not standard.refinements:
         variants = [v for v in variants if not v.overrides[-1].startswith("mesh.refinements")]
-    return [*map(_fidelity, FIDELITIES), *variants, second_path(reference)]
+    return [*map(_fidelity, FIDELITIES), *variants]
 
 
 def chosen_settings(texts: Sequence[str], defaults: Sequence[Setting]) -> list[Setting]:
-    """The settings that were asked for, with the reference and its second path.
+    """The settings that were asked for, and the reference.
 
     Parameters
     ----------
     texts : sequence of str
         Each the name of a default setting, or ``NAME: KEY=VALUE KEY=VALUE ...`` for one's own;
-        values with spaces in quotes.
+        values with spaces in quotes. ``reference: KEY=VALUE ...`` measures against that instead.
     defaults : sequence of Setting
 
     Raises
@@ -107,7 +105,7 @@ def chosen_settings(texts: Sequence[str], defaults: Sequence[Setting]) -> list[S
     wanted = []
     for text in texts:
         name, colon, entries = (part.strip() for part in text.partition(":"))
-        if colon and name and name not in known:
+        if colon and name and (name not in known or name == REFERENCE):
             try:
                 wanted.append(Setting(name, tuple(shlex.split(entries))))
             except ValueError as error:
@@ -120,9 +118,12 @@ def chosen_settings(texts: Sequence[str], defaults: Sequence[Setting]) -> list[S
                 text,
                 f"must be one of {'; '.join(known)}; or a new name, a colon and KEY=VALUE ...",
             )
-    wanted += [known[name] for name in (REFERENCE, SECOND_PATH) if known[name] not in wanted]
+    if REFERENCE not in [setting.name for setting in wanted]:
+        wanted.append(known[REFERENCE])
     slugs = [setting.slug for setting in wanted]
     for setting in wanted:
+        if setting.name == SECOND_PATH:
+            raise SceneError("--settings", setting.name, "is run anyway; choose another name")
         if not setting.slug or slugs.count(setting.slug) > 1:
             raise SceneError("--settings", setting.name, "must be given once, and with letters")
     return wanted

@@ -19,6 +19,7 @@ from avneo_fem.tradeoff.settings import (
     Setting,
     chosen_settings,
     default_settings,
+    second_path,
 )
 
 __all__ = ["Outcome", "evaluate", "plan", "run_study", "write_study"]
@@ -35,7 +36,8 @@ class Outcome:
 
 
 def plan(study: Study, texts: Sequence[str] = ()) -> list[Setting]:
-    """The settings of a study: those that were asked for, or the default ones.
+    """The settings of a study: those that were asked for, or the default ones, and the
+    reference's second path.
 
     Raises
     ------
@@ -43,13 +45,15 @@ def plan(study: Study, texts: Sequence[str] = ()) -> list[Setting]:
         When the scene or a setting is bad input.
     """
 
-    def scene_of(fidelity: str) -> Scene:
-        return load_scene(study.scene, overrides=(*study.overrides, f"fidelity={fidelity}"))
+    def scene_of(setting: Setting) -> Scene:
+        return load_scene(study.scene, overrides=study.overrides_of(setting))
 
-    defaults = default_settings(scene_of(REFERENCE), scene_of("standard"))
+    defaults = default_settings(scene_of(Setting("standard", ("fidelity=standard",))))
     settings = chosen_settings(texts, defaults) if texts else defaults
     for setting in settings:
-        study.key(setting)  # an entry that does not exist is told before anything runs
+        scene_of(setting)  # an entry that does not exist is told before anything runs
+    reference = next(setting for setting in settings if setting.name == REFERENCE)
+    settings = [*settings, second_path(reference, scene_of(reference))]
     return settings
 
 
