@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 
+from avneo_fem.cli_options import Fidelity, Json, Scene, Set
+from avneo_fem.cli_options import people as _people
 from avneo_fem.cli_tables import show_geometry, show_sizes
+from avneo_fem.cli_tradeoff import tradeoff
 from avneo_fem.errors import AvneoError, SceneError
-from avneo_fem.scene import FIDELITIES, load_scene
+from avneo_fem.scene import load_scene
 
 __all__ = ["app", "main"]
 
@@ -26,19 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Virtual suturing for aortic valve neocuspidization (lengths mm, stresses kPa).",
 )
-_people = Console(stderr=True, soft_wrap=True, highlight=False)
-
-Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)")]
-Fidelity = Annotated[str | None, typer.Option(help=f"one of {', '.join(FIDELITIES)}")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="an entry of the scene (repeatable), e.g. --set mesh.size=1.0",
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="print the report on stdout")]
+app.command()(tradeoff)
 
 
 @app.command()
@@ -159,60 +149,6 @@ def plot(folder: Annotated[Path, typer.Argument(metavar="DIR", help="results of 
     given = ValveInput.from_scene(parse_scene(scene))
     surfaces = [read_stl(folder / f"cusp_{index}.stl") for index in indices]
     draw_results(given, folder / "valve.png", surfaces)
-
-
-@app.command()
-def tradeoff(
-    scene: Scene,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="default: out/NAME-tradeoff"),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="TEXT",
-            help='a default setting by name, or "NAME: KEY=VALUE ..." (repeatable; default: all)',
-        ),
-    ] = None,
-    set_: Set = None,
-    repeats: Annotated[int, typer.Option(min=1, help="runs of each setting, for its timing")] = 2,
-    limit: Annotated[
-        float | None, typer.Option(min=1.0, metavar="SECONDS", help="stop a run that takes longer")
-    ] = None,
-    target: Annotated[
-        float | None,
-        typer.Option(min=0.0, metavar="MM", help="mean surface distance to give advice for"),
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="keep the runs that are there")] = False,
-) -> None:
-    """Error against time: run a set of settings and measure them against the reference."""
-    from avneo_fem.geometry.valve_input import ValveInput
-
-    loaded = load_scene(scene, overrides=set_ or ())
-    ValveInput.from_scene(loaded)
-    from avneo_fem.tradeoff.plot import PictureError
-    from avneo_fem.tradeoff.runs import Study
-    from avneo_fem.tradeoff.settings import REFERENCE
-    from avneo_fem.tradeoff.study import evaluate, plan, run_study, write_study
-
-    folder = Path("out") / f"{loaded.name}-tradeoff" if output is None else output
-    study = Study(scene, folder, tuple(set_ or ()), limit)
-    chosen = plan(study, settings or ())
-    try:
-        runs = run_study(study, chosen, repeats, resume, lambda text: _people.print(escape(text)))
-    except KeyboardInterrupt:
-        _people.print("[bold red]avneo:[/] interrupted; --resume goes on from the last run")
-        raise typer.Exit(130) from None
-    outcome = evaluate(runs, target)
-    try:
-        write_study(folder, outcome, f"{loaded.name}: error against time")
-    except PictureError as error:
-        _people.print(f"[yellow]{escape(str(error))}[/]")
-    _people.print(f"written: {escape(str(folder))}")
-    _people.print(f"[bold]advice:[/] {escape(outcome.advice)}")
-    if not any(row.name == REFERENCE and row.verified for row in outcome.rows):
-        raise typer.Exit(1)
 
 
 def _tell_error(error: AvneoError) -> None:

@@ -13,6 +13,7 @@ from avneo_fem.errors import SceneError
 from avneo_fem.tradeoff import runs
 from avneo_fem.tradeoff.runs import Study, kept_run, run_setting
 from avneo_fem.tradeoff.settings import Setting
+from tradeoff_cases import Execute
 
 SETTING = Setting("a name, a b", ("contact.steps=5",))
 
@@ -25,13 +26,13 @@ def study(tmp_path: Path) -> Study:
     return Study(scene, tmp_path / "out", ("mesh.size=1.0",))
 
 
-def told(text: str, status: int | None = 0) -> runs.Run:
+def told(text: str, status: int | None = 0) -> Execute:
     """A stand-in for a process."""
 
     def execute(command: Sequence[str], limit: float | None) -> tuple[int | None, str]:
         return status, text
 
-    return execute  # type: ignore[return-value]
+    return execute
 
 
 def test_command_and_what_is_kept(study: Study) -> None:
@@ -50,7 +51,9 @@ def test_command_and_what_is_kept(study: Study) -> None:
     assert (run.status, run.message, run.folder) == (0, "verified in 3 s", folder)
     assert kept_run(study, SETTING, 1) == run
     assert kept_run(study, SETTING, 0) is None
-    study.clear()
+    study.clear([Setting("another", ())])
+    assert kept_run(study, SETTING, 1) == run
+    study.clear([SETTING])
     assert kept_run(study, SETTING, 1) is None
 
 

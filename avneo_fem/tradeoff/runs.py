@@ -97,9 +97,10 @@ class Study:
         text = json.dumps([scene.model_dump(mode="json"), __version__], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def clear(self) -> None:
-        """Remove what earlier studies kept."""
-        shutil.rmtree(self.folder / "runs", ignore_errors=True)
+    def clear(self, settings: Sequence[Setting]) -> None:
+        """Remove what earlier studies kept of these settings."""
+        for setting in settings:
+            shutil.rmtree(self.run_folder(setting, 0).parent, ignore_errors=True)
 
 
 def kept_run(study: Study, setting: Setting, repeat: int) -> Run | None:

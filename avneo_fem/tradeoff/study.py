@@ -86,7 +86,7 @@ def run_study(
         When the folder cannot be written to.
     """
     if not resume:
-        study.clear()
+        study.clear(settings)
     runs: dict[Setting, list[Run]] = {setting: [] for setting in settings}
     jobs = [(setting, k) for k in range(repeats) for setting in settings]
     jobs = [job for job in jobs if job[0].name != SECOND_PATH or job[1] == 0]
