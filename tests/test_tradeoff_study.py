@@ -53,7 +53,8 @@ def test_study(small_run: Run, tmp_path: Path) -> None:
     found = table(folder)
     crashed = found.pop("standard, no bending")
     assert (crashed["verdict"], crashed["reason"], crashed["runs"]) == ("failed", "boom", "1")
-    assert crashed["surface_mean_mm"] == ""
+    assert (crashed["surface_mean_mm"], crashed["cpu_spread_s"]) == ("", "")
+    assert (found["standard"]["cpu_s"], found["standard"]["cpu_spread_s"]) == ("1.0", "0.0")
     assert {r["verdict"] for r in found.values()} == {"verified"}
     assert {r["surface_mean_mm"] for r in found.values()} == {"0.0000"}
     assert {name: r["runs"] for name, r in found.items() if r["runs"] != "2"} == {SECOND_PATH: "1"}

@@ -104,12 +104,14 @@ def write_csv(path: Path, rows: Sequence[Row], dominated: dict[str, str]) -> Non
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(head)
         for row in rows:
-            times = (row.seconds, row.spread, row.cpu_seconds, row.cpu_spread)
+            # one run has no spread
+            spreads = ["" if row.runs == 1 else f"{x:.1f}" for x in (row.spread, row.cpu_spread)]
+            times = f"{row.seconds:.1f}", spreads[0], f"{row.cpu_seconds:.1f}", spreads[1]
             errors = [
                 "" if row.errors is None else _shown(getattr(row.errors, name)) for name in names
             ]
             cells = [row.name, row.overrides, row.verdict, row.reason, row.runs]
-            cells += [f"{x:.1f}" for x in times]
+            cells += times
             cells += ["" if x is None else x for x in (row.iterations, row.triangles)]
             writer.writerow([*cells, *errors, dominated.get(row.name, "")])
 
