@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 
+from avneo_fem.cli_options import Fidelity, Json, Scene, Set
+from avneo_fem.cli_options import people as _people
 from avneo_fem.cli_tables import show_geometry, show_sizes
+from avneo_fem.cli_tradeoff import tradeoff
 from avneo_fem.errors import AvneoError, SceneError
-from avneo_fem.scene import FIDELITIES, load_scene
+from avneo_fem.scene import load_scene
 
 __all__ = ["app", "main"]
 
@@ -26,20 +28,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Virtual suturing for aortic valve neocuspidization (lengths mm, stresses kPa).",
 )
-_people = Console(stderr=True, soft_wrap=True, highlight=False)
-
-Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)")]
-Fidelity = Annotated[str | None, typer.Option(help=f"one of {', '.join(FIDELITIES)}")]
-Json = Annotated[bool, typer.Option("--json", help="print the report on stdout")]
+app.command()(tradeoff)
 
 
 @app.command()
-def check(scene: Scene, fidelity: Fidelity = None, json: Json = False) -> None:
+def check(scene: Scene, fidelity: Fidelity = None, set_: Set = None, json: Json = False) -> None:
     """Geometry and competence of a scene, without solving anything."""
     from avneo_fem.geometry.valve_input import ValveInput
     from avneo_fem.results.report import geometry_report, to_json
 
-    given = ValveInput.from_scene(load_scene(scene, fidelity))
+    given = ValveInput.from_scene(load_scene(scene, fidelity, set_ or ()))
     geometry = geometry_report(given.geometry, given.wedges)
     show_geometry(_people, geometry)
     if json:
@@ -78,6 +76,7 @@ def suture(
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: out/NAME")
     ] = None,
     fidelity: Fidelity = None,
+    set_: Set = None,
     cusp: Annotated[int | None, typer.Option(min=0, max=2, help="this cusp only")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on after a killed run")] = False,
     json: Json = False,
@@ -85,7 +84,7 @@ def suture(
     """Suture the cusps of a scene and write the results to DIR."""
     from avneo_fem.geometry.valve_input import ValveInput
 
-    loaded = load_scene(scene, fidelity)
+    loaded = load_scene(scene, fidelity, set_ or ())
     given = ValveInput.from_scene(loaded)
     if not given.geometry.competent:
         _people.print(f"[yellow]not competent:[/] {escape(given.geometry.competence_reason)}")

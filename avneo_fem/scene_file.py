@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from pydantic import ValidationError
 
 from avneo_fem.errors import SceneError
 from avneo_fem.scene_fields import entry_schema, known_keys, valid_values
+from avneo_fem.scene_overrides import overridden, parse_overrides
 from avneo_fem.scene_schema import Scene
 from avneo_fem.scene_tables import Cusp
 
@@ -90,13 +92,23 @@ def parse_scene(data: dict[str, Any]) -> Scene:
         raise _scene_error(error) from None
 
 
-def load_scene(path: str | Path, fidelity: str | None = None) -> Scene:
+def load_scene(
+    path: str | Path, fidelity: str | None = None, overrides: Sequence[str] = ()
+) -> Scene:
     """Read and validate a scene file.
+
+    Parameters
+    ----------
+    path : str or Path
+    fidelity : str or None
+        Instead of the file's.
+    overrides : sequence of str
+        ``KEY=VALUE`` each, instead of the file's and of the bundle's; the last one wins.
 
     Raises
     ------
     SceneError
-        When the file is missing, is not TOML or violates the schema.
+        When the file is missing, is not TOML or violates the schema, or an override does.
     """
     path = Path(path)
     try:
@@ -108,4 +120,4 @@ def load_scene(path: str | Path, fidelity: str | None = None) -> Scene:
     data.setdefault("name", path.stem.replace("_", "-"))
     if fidelity is not None:
         data["fidelity"] = fidelity
-    return parse_scene(data)
+    return parse_scene(overridden(data, parse_overrides(overrides)))

@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from avneo_fem.scene_fidelity import FIDELITIES
 from avneo_fem.scene_fields import entry_schema, valid_values
 
 __all__ = ["scene_reference"]
@@ -38,6 +39,22 @@ template.free_edge_length = 58.5
 [[cusp]]
 suture_line.type = "B"
 ```
+
+Every entry can be set from the command line, too: `--set KEY=VALUE` (repeatable) takes a dotted key
+and a TOML value, e.g. `--set mesh.size=1.0 --set cusp.1.template.thickness=0.4`; a single word that
+is no TOML value is text (`--set solver.quality=approximate`).
+
+## Fidelity
+
+`fidelity` chooses defaults, and multiplies `mesh.size`. Where the scene or `--set` gives an entry,
+that is what holds. The defaults in the tables below are those of `standard`. What the bundles cost
+and miss is in [tradeoff.md](tradeoff.md).
+
+"""
+
+_AFTER_FIDELITY = """
+There is no degree and no quadrature to choose: suturing knows triangles of degree 1, whose strain
+is constant. Bending is part of the model, not of its quality: it stays on in every bundle.
 """
 
 
@@ -66,12 +83,26 @@ def _section(title: str, about: str, path: Sequence[str], keys: Sequence[str]) -
     return "\n".join([f"\n## {title}\n", f"{about}\n", head, *rows]) + "\n"
 
 
+def _fidelities() -> str:
+    rows = ["| fidelity | factor on `mesh.size` | defaults | for |", "|---|---|---|---|"]
+    for name, bundle in FIDELITIES.items():
+        entries = [
+            f"`{table}.{key} = {json.dumps(value)}`"
+            for table, inner in bundle.entries.items()
+            for key, value in inner.items()
+        ]
+        told = ", ".join(entries) or "as below"
+        rows.append(f"| {name} | {bundle.size_factor:g} | {told} | {bundle.purpose} |")
+    return "\n".join(rows) + "\n"
+
+
 def scene_reference() -> str:
     """Every table, key, default, unit, valid range and description of a scene file (Markdown)."""
     properties = (entry_schema([]) or {})["properties"]
     tables = [key for key in properties if "properties" in (entry_schema([key]) or {})]
     single = [key for key in properties if key not in (*tables, "cusp")]
-    text = _INTRODUCTION + _section("Whole run", "Entries above the first table.", [], single)
+    text = _INTRODUCTION + _fidelities() + _AFTER_FIDELITY
+    text += _section("Whole run", "Entries above the first table.", [], single)
     order = sorted(tables, key=lambda table: table not in _FIRST)
     for table in order:
         schema = entry_schema([table]) or {}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from avneo_fem.scene_fidelity import FIDELITIES, with_bundle
 from avneo_fem.scene_method import (
     Clamp,
     Contact,
@@ -28,17 +29,16 @@ from avneo_fem.scene_tables import (
     Table,
 )
 
-__all__ = ["FIDELITIES", "Scene"]
-
-#: Named bundles for ``--fidelity``: factor on ``mesh.size``.
-FIDELITIES: dict[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.7, "reference": 0.5}
+__all__ = ["Scene"]
 
 
 class Scene(Table):
     """A complete, resolved scene. Build it in code or with :func:`avneo_fem.scene.load_scene`.
 
     ``template`` and ``suture_line`` hold for all three cusps; ``cusp``, when given, lists three
-    tables that override single entries of them.
+    tables that override single entries of them. Entries that are not given take the default of
+    ``fidelity`` (:mod:`avneo_fem.scene_fidelity`), so a dumped scene states what was used and
+    parses to itself; ``mesh.size`` stays as written, and :attr:`mesh_size` is what it comes to.
     """
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] = Field(
@@ -64,13 +64,18 @@ class Scene(Table):
         True, description="solve congruent cusps once and rotate the result"
     )
     fidelity: Literal["draft", "standard", "fine", "reference"] = Field(
-        "standard", description="quality bundle; multiplies mesh.size by 2, 1, 0.7, 0.5"
+        "standard", description="bundle of defaults, see above"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _defaults_of_fidelity(cls, data: Any) -> Any:
+        return with_bundle(data) if isinstance(data, dict) else data
 
     @property
     def mesh_size(self) -> float:
         """Target edge length after ``fidelity`` [mm]."""
-        return self.mesh.size * FIDELITIES[self.fidelity]
+        return self.mesh.size * FIDELITIES[self.fidelity].size_factor
 
     @property
     def refinements(self) -> int:

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import igl
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
@@ -32,7 +31,9 @@ from scipy.spatial import cKDTree
 
 from avneo_fem.errors import AvneoError, SolveError
 from avneo_fem.geometry.valve_input import ValveInput
+from avneo_fem.results.cusp_curves import BIN, TOUCHING, along, contact_curve, mid_line, sag
 from avneo_fem.results.fields import principal_stretches
+from avneo_fem.results.surface_distance import samples, surface_distance
 from avneo_fem.results.verdict import judge
 from avneo_fem.results.verification_input import constraints_of, surface_of, tolerances_of
 from avneo_fem.results.verify import verify_valve
@@ -44,102 +45,16 @@ from avneo_fem.valve.suture_valve import suture_valve
 matplotlib.use("Agg")
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 DEMOS = Path(__file__).parent
-TOUCHING = 0.05  # beyond its clearance, a cusp this close to its wedge touches it [mm]
-SPACING = 0.1  # between samples of a surface [mm]
-BIN = 0.5  # of the contact curve [mm]
 
 
 # %% [markdown]
 # ## Measures
 #
-# Pure functions of arrays.
+# Those of curves and surfaces are in `avneo_fem.results`; this one needs several meshes.
 
 
 # %%
-def along(points: Floats, positions: Floats, count: int = 401) -> Floats:
-    """(count, 3) places of a polyline, evenly spread by its arc length in the template (n, 2)."""
-    length = np.r_[0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()]
-    wanted = np.linspace(0.0, length[-1], count)
-    return np.column_stack([np.interp(wanted, length, x) for x in positions.T])
-
-
-def samples(points: Floats, triangles: Ints, spacing: float = SPACING) -> tuple[Floats, Floats]:
-    """Places (k, 3) spread over a surface, and the area that each stands for (k,).
-
-    The centres of the n^2 equal parts of every triangle, n the same for all and such that the
-    median edge is cut to ``spacing``.
-    """
-    corners = points[triangles]
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    n = max(1, int(np.ceil(np.median(edges) / spacing)))
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
-    up, down = i + j < n, i + j < n - 1
-    a = np.r_[i[up] + 1 / 3, i[down] + 2 / 3] / n
-    b = np.r_[j[up] + 1 / 3, j[down] + 2 / 3] / n
-    weights = np.column_stack([1.0 - a - b, a, b])
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.repeat(np.linalg.norm(normal, axis=1) / (2 * n * n), n * n)
-    return np.einsum("kc,mcd->mkd", weights, corners).reshape(-1, 3), areas
-
-
-def to_surface(places: Floats, points: Floats, triangles: Ints) -> tuple[Floats, Ints, Floats]:
-    """Distance (k,), triangle (k,) and closest point (k, 3) on a surface."""
-    square, face, closest = igl.point_mesh_squared_distance(
-        *(np.ascontiguousarray(x, float) for x in (places, points)),
-        np.ascontiguousarray(triangles, np.int64),
-    )
-    return np.sqrt(square), face, closest
-
-
-def surface_distance(
-    a: tuple[Floats, Ints], b: tuple[Floats, Ints], chosen: tuple[Any, Any] = (slice(None),) * 2
-) -> tuple[float, float, float]:
-    """Mean, 95 % and largest distance of two surfaces, both ways, weighted by area [mm].
-
-    From the ``chosen`` triangles of each, to all of the other.
-    """
-    found = []
-    for (points, triangles), other, rows in ((a, b, chosen[0]), (b, a, chosen[1])):
-        places, areas = samples(points, triangles[rows])
-        found.append((to_surface(places, *other)[0], areas / areas.sum()))
-    distance, share = (np.concatenate(x) for x in zip(*found, strict=True))
-    rising = np.argsort(distance)
-    reached = share[rising].cumsum() / share.sum()
-    quantile = float(distance[rising][np.searchsorted(reached, 0.95)])
-    return float(distance @ share / share.sum()), quantile, float(distance.max())
-
-
-def mid_line(template: Floats, triangles: Ints, positions: Floats, count: int = 401) -> Floats:
-    """(count, 3) places of the mid-line x = 0 of the template, from suture to free edge."""
-    flat = np.column_stack([template, np.zeros(len(template))])
-    middle = np.abs(template[:, 0]) < 1e-6 * np.ptp(template[:, 0])
-    ends = template[middle, 1]
-    wanted = np.zeros((count, 3))
-    wanted[:, 1] = np.linspace(ends.min(), ends.max(), count)
-    _, face, closest = to_surface(wanted, flat, triangles)
-    a, b, c = (flat[triangles[face, k]] for k in range(3))
-    weights = igl.barycentric_coordinates(closest, a, b, c)
-    return np.einsum("kc,kcd->kd", weights, positions[triangles[face]])
-
-
-def sag(line: Floats) -> float:
-    """Largest distance of a curve from the straight line between its ends [mm]."""
-    chord = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
-    away = line - line[0]
-    return float(np.linalg.norm(away - np.outer(away @ chord, chord), axis=1).max())
-
-
-def contact_curve(places: Floats, wedge: Floats, width: float = BIN) -> Floats:
-    """(m,) lowest z of what touches, by arc length along the wedge (n, 2); nan where none does."""
-    length = np.r_[0.0, np.linalg.norm(np.diff(wedge, axis=0), axis=1).cumsum()]
-    row = (length[cKDTree(wedge).query(places[:, :2])[1]] / width).astype(int)
-    lowest = np.full(int(length[-1] / width) + 1, np.inf)
-    np.minimum.at(lowest, row, places[:, 2])
-    return np.where(np.isfinite(lowest), lowest, np.nan)
-
-
 def order(sizes: list[float], values: list[float]) -> float | None:
     """p of value = limit + c h^p from three sizes; None unless monotone and 0.5 <= p <= 4."""
     (a, b, c), (first, second) = sizes, -np.diff(values)
@@ -482,9 +397,7 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     sizes = sorted(set(asked.sizes), reverse=True)
     try:
-        scene = load_scene(asked.scene)
-        solver = scene.solver.model_copy(update={"quality": "equilibrium"})
-        scene = scene.model_copy(update={"solver": solver, "fidelity": "standard"})
+        scene = load_scene(asked.scene, "standard", ["solver.quality=equilibrium"])
         given = ValveInput.from_scene(scene)
         asked.out.mkdir(parents=True, exist_ok=True)
         runs = [reported(suture(scene, size)) for size in sizes]

@@ -314,6 +314,7 @@ def test_check_needs_no_solver() -> None:
         (["check", str(DEMOS / "experiment_1.toml")], 0),
         (["size", str(DEMOS / "experiment_1.toml")], 0),
         (["suture", "missing.toml"], 2),
+        (["tradeoff", "missing.toml"], 2),
     ):
         process = subprocess.run(
             [sys.executable, "-c", script, *arguments],
@@ -332,9 +333,9 @@ def test_entry_points() -> None:
     assert entry.load().__module__ == "avneo_fem.cli"
     text = avneo("--help")
     assert text.returncode == 0
-    for command in ("check", "size", "suture", "plot"):
+    for command in ("check", "size", "suture", "plot", "tradeoff"):
         assert f" {command} " in text.stdout
-    for option in ("--output", "--fidelity", "--cusp", "--resume", "--json"):
+    for option in ("--output", "--fidelity", "--set", "--cusp", "--resume", "--json"):
         assert option in avneo_inside("suture", "--help").stdout
 
 

@@ -94,13 +94,24 @@ def report(given: ValveInput, failures: list[str]) -> dict[str, Any]:
     )
 
 
+def test_report_states_what_was_used() -> None:
+    """Truth: the scene in the report is the scene of the run, entries of its fidelity included, and
+    the mesh size is what came out of it."""
+    scene = load_scene(DEMOS / "experiment_1.toml", "draft", ["contact.steps=7"])
+    told = json.loads(to_json(report(ValveInput.from_scene(scene), [])))
+    assert parse_scene(told["scene"]) == scene
+    assert told["scene"]["solver"]["quality"] == "approximate"
+    assert told["scene"]["contact"]["steps"] == 7
+    assert told["mesh_size_mm"] == parse_scene(told["scene"]).mesh_size == 1.4
+
+
 def test_report_says_what_it_was_given() -> None:
     """Truth: every figure at the key of design.md §2; verified just when there is no failure."""
     given = demo(1)
     good, bad = report(given, []), report(given, ["one", "two"])
     assert (good["verified"], good["failures"]) == (True, [])
     assert (bad["verified"], bad["failures"]) == (False, ["one", "two"])
-    assert good["fidelity"] == "standard"
+    assert (good["fidelity"], good["mesh_size_mm"]) == ("standard", 0.7)
     assert good["versions"] == {"avneo_fem": __version__, "dolfinx": "0.5.2"}
     cusps = good["cusps"]
     assert [cusp["index"] for cusp in cusps] == [0, 1, 2]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from avneo_fem.errors import AvneoError, SceneError, SolveError
-from avneo_fem.scene import FIDELITIES, Mesh, Scene, load_scene, parse_scene
+from avneo_fem.scene import FIDELITIES, Mesh, Scene, Solver, load_scene, parse_scene
 
 DEMOS = Path(__file__).parents[1] / "demos"
 NUMBERS = {
@@ -263,6 +263,48 @@ def test_fidelity_scales_the_mesh(tmp_path: Path) -> None:
     assert sizes == pytest.approx(expected)
     with pytest.raises(SceneError, match="fidelity = 'best'"):
         load_scene(path, "best")
+
+
+def test_a_bundle_gives_defaults_only(tmp_path: Path) -> None:
+    """Truth: what a scene states wins over its fidelity, in a file, by tables in code and by
+    ``--set``; the rest of the bundle holds."""
+    table, entries = next(iter(FIDELITIES["draft"].entries.items()))
+    key, value = next(iter(entries.items()))
+    assert (table, key, value) == ("solver", "quality", "approximate")
+    assert parse_scene({"fidelity": "draft"}).solver.quality == "approximate"
+    assert Scene(fidelity="draft").solver.quality == "approximate"
+    stated = {"fidelity": "draft", "solver": {"quality": "equilibrium"}}
+    assert parse_scene(stated).solver.quality == "equilibrium"
+    in_code = Scene(fidelity="draft", solver=Solver(tolerance=1e-6))
+    assert (in_code.solver.quality, in_code.solver.tolerance) == ("approximate", 1e-6)
+    in_code = Scene(fidelity="draft", solver=Solver(quality="equilibrium"))
+    assert in_code.solver.quality == "equilibrium"
+    path = tmp_path / "valve.toml"
+    path.write_text("", encoding="utf-8")
+    scene = load_scene(path, "draft", ["solver.quality=equilibrium", "mesh.size=1.0"])
+    assert (scene.solver.quality, scene.mesh_size) == ("equilibrium", 2.0)
+
+
+@pytest.mark.parametrize("name", FIDELITIES)
+def test_a_dumped_scene_of_any_fidelity_is_that_scene(name: str) -> None:
+    """Truth: no factor and no default is applied twice, and every entry of a bundle exists."""
+    scene = parse_scene({"fidelity": name, "mesh": {"size": 0.8}})
+    again = parse_scene(json.loads(scene.model_dump_json()))
+    assert (again, again.mesh_size) == (scene, scene.mesh_size)
+    for table, entries in FIDELITIES[name].entries.items():
+        assert scene.model_dump()[table] | dict(entries) == scene.model_dump()[table]
+    plain = Scene().model_dump()
+    assert all(plain[t][k] != v for t, e in FIDELITIES[name].entries.items() for k, v in e.items())
+
+
+@pytest.mark.parametrize("data", [{"solver": 3}, {"fidelity": []}, {"fidelity": "best"}])
+def test_a_bundle_hides_no_error(data: dict[str, Any]) -> None:
+    """Truth: a table that is none, or a fidelity that does not exist, is named as written."""
+    key, value = next(iter(data.items()))
+    for fidelity in ({"fidelity": "draft"}, {}):
+        error = refused({**fidelity, **data})
+        assert error.key == key
+        assert error.value in (value, tuple(value) if isinstance(value, list) else value)
 
 
 def test_a_file_without_a_name_is_named_after_itself(tmp_path: Path) -> None:

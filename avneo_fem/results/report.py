@@ -105,6 +105,7 @@ def build_report(
         "scene": {"name": scene.name, **scene.model_dump(mode="json")},
         "versions": {"avneo_fem": __version__, **versions},
         "fidelity": scene.fidelity,
+        "mesh_size_mm": scene.mesh_size,
         "verified": not failures,
         "failures": failures,
         "geometry": geometry,

@@ -1,0 +1,1 @@
+"""Error against time: which settings of a scene are worth their time (``avneo tradeoff``)."""
