@@ -46,7 +46,7 @@ def raising_factor(
     power = 1.0
     if before is not None:
         gained = np.log(before[1] / now[1]) / np.log(now[0] / before[0])
-        power = float(np.clip(gained, 1e-2, 1.0))
+        power = float(np.clip(gained, 0.1, 1.0))
     wanted = np.log(1.3) + np.log(now[1] / most) / power
     return largest if wanted >= np.log(largest) else float(np.exp(wanted))
 
@@ -87,14 +87,16 @@ class PenaltyRaising(CuspProgress):
         )
 
     def _bulging(self, points: Floats) -> Floats:
-        """(n,) by how much the edges at a node miss the clearance from the wedge between nodes.
+        """(n,) by how much edges from a node to the stitch miss the clearance from the wedge.
 
-        Nodes that are held, and edges between them, apart: the stitch puts them there.
+        Next to the commissures neighbouring cusps lie at their clearance on both sides of the
+        wedge, and one end of these edges cannot give way. Elsewhere a flat triangle that cuts a
+        bend of the wedge has room on the other side of it.
         """
         setup, edges = self.setup, self.setup.mesh.edges
         held = np.zeros(len(points), dtype=bool)
         held[setup.mesh.suture_line] = held[setup.row.nodes] = True
-        edges = edges[~held[edges].all(axis=1)]
+        edges = edges[held[edges].sum(axis=1) == 1]
         short = shortfall_between(setup.wedge.field, points, edges, setup.wedge_clearance)
         result = np.zeros(len(points))
         for ends in edges.T:
