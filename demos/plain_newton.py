@@ -32,10 +32,12 @@ Floats = NDArray[np.float64]
 
 #: of the viscous force: in units of E H / R^2, and what follows as shares of it
 _STRONG, _SHARES = 15.0, (1.0, 1e-2, 1e-4)
-_CONTACT_LEVELS = 14
+_CONTACT_LEVELS = 14  # each twice the one before
+_WALL_LEVELS, _WALL_GROWTH = 4, 4.0
 _ITERATIONS = 50  # of one solve, Table 1
-_TOLERANCE = 1e-6  # of one solve, residual over the pressure load
-_WALL_LEVELS = 6
+_TOLERANCE = 1e-5  # of one solve, residual over the pressure load
+#: as in the last level of our solver: an equilibrium
+_EQUILIBRIUM = 1e-8
 
 
 @dataclass(frozen=True)
@@ -81,8 +83,8 @@ class _BrokenDown(ArithmeticError):
 class _PlainSolver:
     """Newton's method on one system."""
 
-    def __init__(self, setup: CuspSetup) -> None:
-        self.setup, self.model = setup, setup.model
+    def __init__(self, setup: CuspSetup, damped: bool) -> None:
+        self.setup, self.model, self.shares = setup, setup.model, _SHARES if damped else (0.0,)
         self.system = CuspSystem(setup.model, None)
         self.system.fix(setup.model.position_dofs[setup.mesh.suture_line])
         self.factorization = Factorization(symmetric=False)
@@ -99,7 +101,7 @@ class _PlainSolver:
         step[self.model.position_dofs] = share * moves
         return step
 
-    def _solve(self, state: Floats, damping: float) -> tuple[Floats, int]:
+    def _solve(self, state: Floats, damping: float, tolerance: float) -> tuple[Floats, int]:
         """At most 50 iterations with a viscous force towards ``state``."""
         system, free = self.system, self.system.free
         extra = [ProximalTerm(system.positions(state), self.model.node_areas, damping * self.unit)]
@@ -108,7 +110,7 @@ class _PlainSolver:
             force = system.residual(state, extra)[free]
             if not np.isfinite(force).all():
                 raise _BrokenDown("the residual is not a number")
-            if np.linalg.norm(force) <= _TOLERANCE * system.load_scale():
+            if np.linalg.norm(force) <= tolerance * system.load_scale():
                 return state, iteration
             tangent = system.tangent(state, extra)[free][:, free].tocsr()
             if not np.isfinite(tangent.data).all():
@@ -124,14 +126,13 @@ class _PlainSolver:
             state = state + self._capped(step)
         return state, _ITERATIONS
 
-    def level(
-        self, cusp: PlainCusp, state: Floats, name: str, parameter: float, damped: bool = True
-    ) -> Floats:
-        """One level: damped three times, or once without."""
-        used = 0
+    def level(self, cusp: PlainCusp, state: Floats, name: str, parameter: float) -> Floats:
+        """One level: damped ever less, or not at all; the last level is never damped."""
+        used, last = 0, name == "equilibrium"
         self.setup.clamp.renew(self.system.positions(state))
-        for share in _SHARES if damped else (0.0,):
-            state, iterations = self._solve(state, _STRONG * share)
+        for share in (0.0,) if last else self.shares:
+            tolerance = _EQUILIBRIUM if last else _TOLERANCE
+            state, iterations = self._solve(state, _STRONG * share, tolerance)
             used += iterations
         residual = self.system.relative_residual(renew_directors(self.model, state))
         cusp.levels.append(PlainLevel(name, parameter, used, residual))
@@ -160,17 +161,17 @@ def _clamped(setup: CuspSetup, solver: _PlainSolver, points: Floats) -> Floats:
     return state
 
 
-def _stages(cusp: PlainCusp, given: ValveInput, index: int) -> None:
+def _stages(cusp: PlainCusp, given: ValveInput, index: int, damped: bool) -> None:
     """Sections 3.2 and 3.4 of the paper, one level after the other."""
     first = _membrane(given, index, cusp.mesh)
-    solver = _PlainSolver(first)
+    solver = _PlainSolver(first, damped)
     state = np.zeros(first.model.size)
     state[first.model.position_dofs] = first.start
     state[first.model.position_dofs[cusp.mesh.suture_line]] = first.target
     solver.level(cusp, state, "membrane", 1.0)
 
     setup = CuspSetup(given.scene, given.geometry, given.wedges, index, cusp.mesh, cusp.points)
-    solver = _PlainSolver(setup)
+    solver = _PlainSolver(setup, damped)
     state = _clamped(setup, solver, cusp.points)
     terms = solver.system.terms
     terms.append(setup.clamp)
@@ -179,7 +180,7 @@ def _stages(cusp: PlainCusp, given: ValveInput, index: int) -> None:
     contact, lambdas = setup.wedge.stiffness, given.wedges.levels(given.scene.contact.steps)
     terms.append(setup.wedge)
     setup.wedge.field = given.wedges.wedge(index, lambdas[0])
-    for number in reversed(range(_CONTACT_LEVELS)):
+    for number in reversed(range(_CONTACT_LEVELS if damped else 1)):
         setup.wedge.stiffness = contact / 2.0**number
         state = solver.level(cusp, state, "contact penalty", setup.wedge.stiffness)
     for lam in lambdas[1:]:
@@ -188,15 +189,15 @@ def _stages(cusp: PlainCusp, given: ValveInput, index: int) -> None:
 
     terms.append(setup.wall)
     for number in range(_WALL_LEVELS):
-        setup.wall.stiffness = given.scene.wall.stiffness * 2.0**number
+        setup.wall.stiffness = given.scene.wall.stiffness * _WALL_GROWTH**number
         state = solver.level(cusp, state, "wall", setup.wall.stiffness)
         if not setup.wall.shortfall(cusp.points).any():
             break
-    solver.level(cusp, state, "without damping", 0.0, damped=False)
-    cusp.converged = cusp.residual <= _TOLERANCE
+    solver.level(cusp, state, "equilibrium", setup.wall.stiffness)
+    cusp.converged = cusp.residual <= _EQUILIBRIUM
 
 
-def suture_plainly(given: ValveInput, index: int, mesh: CuspMesh) -> PlainCusp:
+def suture_plainly(given: ValveInput, index: int, mesh: CuspMesh, damped: bool = True) -> PlainCusp:
     """Take one cusp through all levels, or as far as they go.
 
     Parameters
@@ -206,12 +207,14 @@ def suture_plainly(given: ValveInput, index: int, mesh: CuspMesh) -> PlainCusp:
         Which cusp.
     mesh : CuspMesh
         Its triangulated template; there is no coarser one.
+    damped : bool
+        Without, there is neither viscous force nor a ramp of the contact penalty.
     """
     clock = time.perf_counter()
     cusp = PlainCusp(mesh, np.c_[mesh.points, np.zeros(len(mesh.points))])
     with np.errstate(all="ignore"):  # numbers that are none are looked for, and told
         try:
-            _stages(cusp, given, index)
+            _stages(cusp, given, index, damped)
         except _BrokenDown as error:
             last = cusp.levels[-1].name if cusp.levels else "placement"
             cusp.failure = f"broke down after the level {last!r}: {error}"
