@@ -34,9 +34,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from expected import DEMOS, changed
 from numpy.typing import NDArray
-from plain_newton import suture_plainly
 
 from avneo_fem.geometry.resizing import resized_scene
 from avneo_fem.geometry.valve_input import ValveInput
@@ -48,6 +46,8 @@ from avneo_fem.results.verification_input import constraints_of
 from avneo_fem.results.writing import written_whole
 from avneo_fem.scene import Scene, load_scene
 from avneo_fem.valve.suture_valve import mesh_templates, suture_valve
+from expected import DEMOS, changed
+from plain_newton import PlainLevel, suture_plainly
 
 Floats = NDArray[np.float64]
 METHODS = {
@@ -80,6 +80,7 @@ class Run:
     iterations: int
     seconds: float
     residual: float
+    levels: tuple[PlainLevel, ...] = ()
 
     @property
     def self_crossings(self) -> int:
@@ -124,6 +125,7 @@ def turned(points: Floats) -> list[Floats]:
 def run(contact: str, solver: str, scene: Scene) -> Run:
     """Suture cusp 0 of a scene with equal cusps."""
     scene = changed(scene, contact={"method": METHODS[contact]})
+    levels: tuple[PlainLevel, ...] = ()
     clock = time.perf_counter()
     if solver == OURS:
         given = ValveInput.from_scene(scene)
@@ -137,10 +139,32 @@ def run(contact: str, solver: str, scene: Scene) -> Run:
         cusp = suture_plainly(given, 0, mesh, damped=solver == DAMPED)
         points, triangles = cusp.points, mesh.triangles
         outcome = cusp.failure or ("converged" if cusp.converged else "no equilibrium found")
-        iterations, residual = cusp.iterations, cusp.residual
+        iterations, residual, levels = cusp.iterations, cusp.residual, tuple(cusp.levels)
     seconds = time.perf_counter() - clock
     surfaces = [(place, triangles) for place in turned(points)]
-    return Run(contact, solver, given, surfaces, outcome, iterations, seconds, residual)
+    return Run(contact, solver, given, surfaces, outcome, iterations, seconds, residual, levels)
+
+
+# %% [markdown]
+# Where Newton's method is lost shows in the residual and the crossings that each stage leaves.
+
+
+# %%
+def stages(found: list[Run]) -> str:
+    """Table of the stages of the runs that are not ours: residual and crossings at their ends."""
+    runs = [one for one in found if one.levels]
+    lines = [
+        ["stage", *(f"{one.contact}, {one.solver}" for one in runs)],
+        ["---"] * (len(runs) + 1),
+    ]
+    ends = [{level.name: level for level in one.levels} for one in runs]
+    for name in dict.fromkeys(name for end in ends for name in end):
+        cells = [
+            f"{end[name].residual:.0e}; {end[name].crossings}" if name in end else ""
+            for end in ends
+        ]
+        lines.append([name, *cells])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 # %% [markdown]
@@ -197,6 +221,8 @@ def main(arguments: list[str] | None = None) -> int:
         textwrap.fill(TOLD, 100),
         f"## Experiment 1, L_f = 39 mm, h = {asked.size:g} mm",
         "\n".join([HEAD, *(one.row for one in found)]),
+        "Residual (without damping) and crossings at the end of each stage of Newton's method:",
+        stages(found),
         "![the sutured valves side by side](baselines.png)",
     ]
     draw(asked.out / "baselines.png", found)
@@ -206,6 +232,7 @@ def main(arguments: list[str] | None = None) -> int:
         text += [
             f"## A larger cusp, L_f = {LARGER:g} mm",
             "\n".join([HEAD, *(one.row for one in more)]),
+            stages(more),
         ]
     with written_whole(asked.out / "baselines.md") as temporary:
         temporary.write_text("\n\n".join(text) + "\n", encoding="utf-8")

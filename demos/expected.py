@@ -173,10 +173,16 @@ class Asked:
 
     size: float | None
     out: Path
+    geometry_only: bool
+
+    def end_of_geometry(self) -> None:
+        """Leave the page here when no more was asked for."""
+        if self.geometry_only:
+            raise SystemExit(0)
 
 
 def asked(what: str, out: str) -> Asked:
-    """``[--size H] [--out DIR]``; by default the scene's h, and ``out``/NAME beside ``demos``.
+    """``[--size H] [--out DIR] [--geometry]``; by default the scene's h, and ``out``/NAME.
 
     From here on a missed figure or a bad scene ends the script with its message alone.
     """
@@ -184,8 +190,9 @@ def asked(what: str, out: str) -> Asked:
     parser = argparse.ArgumentParser(description=what)
     parser.add_argument("--size", type=float, help="h [mm], default that of the scene")
     parser.add_argument("--out", type=Path, default=DEMOS.parent / "out" / out)
+    parser.add_argument("--geometry", action="store_true", help="suture nothing: about a second")
     found = parser.parse_args()
-    return Asked(found.size, found.out)
+    return Asked(found.size, found.out, found.geometry)
 
 
 def _tell(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

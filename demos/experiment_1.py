@@ -8,7 +8,7 @@
 #
 # This page states the figures that must come out, and fails when one does not.
 #
-#     python demos/experiment_1.py [--size H] [--out DIR]
+#     python demos/experiment_1.py [--size H] [--out DIR] [--geometry]
 
 # %%
 from __future__ import annotations
@@ -55,6 +55,7 @@ demand(
 # and brought into the root; the last level is an undamped equilibrium.
 
 # %%
+page.end_of_geometry()
 report = suture(given, page.out)
 
 # %% [markdown]

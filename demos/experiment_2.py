@@ -6,7 +6,7 @@
 # chord is of middle length, the smallest to the longest. A method that copes with this can be
 # handed whatever an optimiser tries.
 #
-#     python demos/experiment_2.py [--size H] [--out DIR]
+#     python demos/experiment_2.py [--size H] [--out DIR] [--geometry]
 
 # %%
 from __future__ import annotations
@@ -66,6 +66,7 @@ demand(
 # through a root of 12 mm radius.
 
 # %%
+page.end_of_geometry()
 report = suture(given, page.out)
 
 # %% [markdown]

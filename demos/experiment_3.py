@@ -5,12 +5,13 @@
 # commissures: in proportion to the chords, L_f = alpha a with alpha of at least 2/sqrt(3) = 1.155.
 # Here alpha is exactly that, for commissures 6 : 4 : 5 apart.
 #
-#     python demos/experiment_3.py [--size H] [--out DIR]
+#     python demos/experiment_3.py [--size H] [--out DIR] [--geometry]
 
 # %%
 from __future__ import annotations
 
 import numpy as np
+
 from expected import asked, demand, equal, geometry_figures, suture, sutured_figures, valve
 
 page = asked("Experiment 3: cusps of quasi-optimal size", "experiment-3")
@@ -74,6 +75,7 @@ print(f"by {bent[0]:.1f} mm in Experiment 1")
 # Three different cusps, each with little to fold.
 
 # %%
+page.end_of_geometry()
 report = suture(given, page.out)
 
 # %% [markdown]

@@ -23,6 +23,7 @@ from avneo_fem.equilibrium.directors import clamp_rotation, renew_directors, sta
 from avneo_fem.equilibrium.factorization import Factorization, FactorizationError
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.cusp_mesh import CuspMesh
+from avneo_fem.results.crossings import self_intersections
 from avneo_fem.scene import parse_scene
 from avneo_fem.stages.cusp_setup import CuspSetup
 
@@ -42,12 +43,14 @@ _EQUILIBRIUM = 1e-8
 
 @dataclass(frozen=True)
 class PlainLevel:
-    """How a level ended: undamped residual over the pressure load, and all its iterations."""
+    """How a level ended: its iterations, the undamped residual over the pressure load, and the
+    pairs of triangles that meet."""
 
     name: str
     parameter: float
     iterations: int
     residual: float
+    crossings: int
 
 
 @dataclass
@@ -135,8 +138,9 @@ class _PlainSolver:
             state, iterations = self._solve(state, _STRONG * share, tolerance)
             used += iterations
         residual = self.system.relative_residual(renew_directors(self.model, state))
-        cusp.levels.append(PlainLevel(name, parameter, used, residual))
         cusp.points = self.system.positions(state)
+        crossings = self_intersections(cusp.points, cusp.mesh.triangles)
+        cusp.levels.append(PlainLevel(name, parameter, used, residual, crossings))
         return state
 
 

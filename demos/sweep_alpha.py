@@ -24,8 +24,6 @@ from pathlib import Path
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
-from expected import DEMOS, changed
-from refinement_study import TOUCHING, samples
 
 from avneo_fem.errors import AvneoError
 from avneo_fem.geometry.resizing import resized_scene
@@ -40,6 +38,8 @@ from avneo_fem.results.writing import written_whole
 from avneo_fem.scene import Scene, load_scene
 from avneo_fem.stages.record import CuspResult
 from avneo_fem.valve.suture_valve import suture_valve
+from expected import DEMOS, changed
+from refinement_study import TOUCHING, samples
 
 matplotlib.use("Agg")
 CLOSING = 2.0 / np.sqrt(3.0)
