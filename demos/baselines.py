@@ -228,7 +228,7 @@ def main(arguments: list[str] | None = None) -> int:
     draw(asked.out / "baselines.png", found)
     if not asked.quick:
         larger = resized_scene(scene, [LARGER] * 3)
-        more = list(runs(larger, ("curved", "virtual planes"), SOLVERS))
+        more = list(runs(larger, ("virtual planes",), SOLVERS))
         text += [
             f"## A larger cusp, L_f = {LARGER:g} mm",
             "\n".join([HEAD, *(one.row for one in more)]),
