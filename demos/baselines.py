@@ -189,11 +189,15 @@ def draw(path: Path, found: list[Run]) -> None:
 
     def panel(solver: str, contact: str) -> Panel:
         one = places[solver, contact]
-        label = f"{contact}; {solver}: {one.self_crossings} crossings in a cusp"
+        label = f"{contact}; {solver}: {one.self_crossings} crossings"
         drawing = drawing_of(one.given.geometry, one.surfaces)
         return Panel(drawing, "from the aorta", label)
 
-    draw_grid(path, [[panel(solver, contact) for contact in contacts] for solver in solvers])
+    draw_grid(
+        path,
+        [[panel(solver, contact) for contact in contacts] for solver in solvers],
+        field=(660, 690),
+    )
 
 
 TOLD = """\
