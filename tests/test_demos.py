@@ -34,9 +34,11 @@ def script(
     )
 
 
-def page(number: int, size: float, out: Path) -> None:
+def page(number: int, size: float, out: Path, timeout: float = 900.0) -> None:
     """Run the page of an experiment; its figures hold, and its results are there."""
-    process = script(f"experiment_{number}.py", "--size", f"{size:g}", "--out", out)
+    process = script(
+        f"experiment_{number}.py", "--size", f"{size:g}", "--out", out, timeout=timeout
+    )
     assert process.returncode == 0, process.stderr
     assert f"Experiment {number}: all figures as stated" in process.stdout
     assert "missed" not in process.stdout
@@ -52,6 +54,13 @@ def test_experiment_1(tmp_path: Path) -> None:
 def test_experiment_3(tmp_path: Path) -> None:
     """Truth: Experiment 3 at h = 2 mm meets every figure of its page."""
     page(3, 2.0, tmp_path / "out")
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="Experiment 2 is not verified yet (docs/experiments.md)")
+def test_experiment_2(tmp_path: Path) -> None:
+    """Truth: Experiment 2 at twice the paper's h meets every figure of its page."""
+    page(2, 1.4, tmp_path / "out", timeout=3600.0)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
