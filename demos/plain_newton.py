@@ -31,9 +31,11 @@ __all__ = ["PlainCusp", "PlainLevel", "suture_plainly"]
 
 Floats = NDArray[np.float64]
 
-#: of the viscous force: in units of E H / R^2, and what follows as shares of it
-_STRONG, _SHARES = 15.0, (1.0, 1e-2, 1e-4)
+#: of the viscous force: in units of E H / R^2, and what follows as shares of it. With less, the
+#: jump of the edge to its line is not survived; the last of the three is what our solver begins with
+_STRONG, _SHARES = 1.5e4, (1.0, 1e-2, 1e-4)
 _CONTACT_LEVELS = 14  # each twice the one before
+_CLAMP_LEVELS, _CLAMP_GROWTH = 5, 4.0
 _WALL_LEVELS, _WALL_GROWTH = 4, 4.0
 _ITERATIONS = 50  # of one solve, Table 1
 _TOLERANCE = 1e-5  # of one solve, residual over the pressure load
@@ -161,7 +163,6 @@ def _clamped(setup: CuspSetup, solver: _PlainSolver, points: Floats) -> Floats:
     state[edges] += clamp_rotation(model, state, setup.conormal)
     solver.system.fix(edges)
     setup.clamp.active[:] = True
-    setup.clamp.stiffness = setup.scene.clamp.stiffness
     return state
 
 
@@ -179,7 +180,9 @@ def _stages(cusp: PlainCusp, given: ValveInput, index: int, damped: bool) -> Non
     state = _clamped(setup, solver, cusp.points)
     terms = solver.system.terms
     terms.append(setup.clamp)
-    state = solver.level(cusp, state, "shell", 1.0)
+    for number in reversed(range(_CLAMP_LEVELS if damped else 1)):
+        setup.clamp.stiffness = given.scene.clamp.stiffness / _CLAMP_GROWTH**number
+        state = solver.level(cusp, state, "shell", setup.clamp.stiffness)
 
     contact, lambdas = setup.wedge.stiffness, given.wedges.levels(given.scene.contact.steps)
     terms.append(setup.wedge)
@@ -212,7 +215,7 @@ def suture_plainly(given: ValveInput, index: int, mesh: CuspMesh, damped: bool =
     mesh : CuspMesh
         Its triangulated template; there is no coarser one.
     damped : bool
-        Without, there is neither viscous force nor a ramp of the contact penalty.
+        Without, there is neither viscous force nor a ramp of the penalties of contact and clamp.
     """
     clock = time.perf_counter()
     cusp = PlainCusp(mesh, np.c_[mesh.points, np.zeros(len(mesh.points))])
