@@ -31,8 +31,8 @@ __all__ = ["PlainCusp", "PlainLevel", "suture_plainly"]
 
 Floats = NDArray[np.float64]
 
-#: of the viscous force: in units of E H / R^2, and what follows as shares of it. With less, the
-#: jump of the edge to its line is not survived; the last of the three is what our solver begins with
+#: of the viscous force: in units of E H / R^2, and what follows as shares of it. With less,
+#: the jump of the edge to its line is not survived; the last is what our solver begins with
 _STRONG, _SHARES = 1.5e4, (1.0, 1e-2, 1e-4)
 _CONTACT_LEVELS = 14  # each twice the one before
 _CLAMP_LEVELS, _CLAMP_GROWTH = 5, 4.0
