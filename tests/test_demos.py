@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import expected
-from run_cases import environment
+from run_cases import Run, environment
 from valve_cases import DEMOS
 
 pytest.importorskip("matplotlib")
@@ -125,6 +125,39 @@ def test_figures(figure: expected.Figure, holds: bool) -> None:
     else:
         with pytest.raises(expected.FigureMissed, match=r"title, 1 of 1 missed:\n  x: expected "):
             expected.demand("title", [figure])
+
+
+def test_figure_8(small_run: Run, tmp_path: Path) -> None:
+    """Truth: picture and table come from three results folders, here of one small valve under three
+    names; one that is not verified is called that, with its reasons."""
+    for number in (1, 2, 3):
+        folder = tmp_path / "results" / f"experiment-{number}"
+        shutil.copytree(small_run.folder, folder)
+        report = small_run.report
+        report["scene"]["name"] = f"experiment-{number}"
+        report["verified"] = number != 2
+        report["failures"] = ["cusp 0: free edge sags by 7 mm"] if number == 2 else []
+        (folder / "report.json").write_text(json.dumps(report))
+    out = tmp_path / "docs"
+    process = script("figure_8.py", "--results", tmp_path / "results", "--out", out)
+    assert process.returncode == 0, process.stderr
+    text = (out / "experiments.md").read_text(encoding="utf-8")
+    assert "| verified | yes | no | yes |" in text
+    assert "Experiment 2 is not verified:\n\n- cusp 0: free edge sags by 7 mm\n" in text
+    nu = small_run.report["geometry"]["nu_star"]
+    assert f"| nu* | {nu:.4f} | {nu:.4f} | {nu:.4f} |" in text
+    assert (out / "figure_8.png").stat().st_size > 10_000
+
+
+def test_figure_8_of_something_else(small_run: Run, tmp_path: Path) -> None:
+    """Truth: results of another scene are refused in one line that names the folder."""
+    shutil.copytree(small_run.folder, tmp_path / "experiment-1")
+    process = script("figure_8.py", "--results", tmp_path, "--out", tmp_path / "docs")
+    assert process.returncode == 2
+    (line,) = process.stderr.splitlines()
+    assert "experiment-1" in line
+    assert "must hold a run of all cusps of experiment_1.toml" in line
+    assert not (tmp_path / "docs").exists()
 
 
 @pytest.mark.slow
