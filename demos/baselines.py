@@ -210,6 +210,12 @@ coarser mesh, the others do not.
 """
 
 
+def write(folder: Path, text: list[str]) -> None:
+    """The page; what there is of it is kept before the larger cusp is begun."""
+    with written_whole(folder / "baselines.md") as temporary:
+        temporary.write_text("\n\n".join(text) + "\n", encoding="utf-8")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run everything and write table and picture."""
     parser = argparse.ArgumentParser(description="Contact surfaces and solvers, taken apart")
@@ -240,6 +246,7 @@ def main(arguments: list[str] | None = None) -> int:
         "![the sutured valves side by side](baselines.png)",
     ]
     draw(asked.out / "baselines.png", found)
+    write(asked.out, text)
     if not asked.quick:
         larger = resized_scene(scene, [LARGER] * 3)
         more = list(runs(larger, ("virtual planes",), (OURS, DAMPED)))
@@ -248,8 +255,7 @@ def main(arguments: list[str] | None = None) -> int:
             "\n".join([HEAD, *(one.row for one in more)]),
             stages(more),
         ]
-    with written_whole(asked.out / "baselines.md") as temporary:
-        temporary.write_text("\n\n".join(text) + "\n", encoding="utf-8")
+        write(asked.out, text)
     return 0
 
 
