@@ -247,7 +247,7 @@ def main(arguments: list[str] | None = None) -> int:
     told = TOLD.format(chord=chord, quality=asked.quality, size=asked.size)
     text = [
         "# How long should a free edge be?",
-        f"Written by `python demos/sweep_alpha.py --size {asked.size:g} --quality {asked.quality}`.",
+        "Written by `python demos/sweep_alpha.py`.",
         textwrap.fill(told, 100),
         "\n".join([HEAD, *(valve.row for valve in valves)]),
         "![sutured valves, nu* and contact over alpha](sweep_alpha.png)",
