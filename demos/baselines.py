@@ -214,16 +214,19 @@ coarser mesh, the others do not.
 NOTES = """\
 ## What is seen
 
-With the solvers of the literature the claim holds, for planes and curves alike. Damped, Newton's
-method brings the cusp to its line and clamps it (residual 7e-3, with some hundred crossings). The
-virtual planes then lose it as soon as they begin to push. The curved surfaces begin as a wide wedge,
-where it converges (1e-3), and lose it on the way to lambda = 1. Undamped, it is lost from the first
-jump of the edge on. Our solver reaches equilibrium with every contact surface, without a crossing:
-at this size it is the solver that fails, not the planes. But what planes give is another valve: its
-free edges, twice as long as the way to the centre, lie crumpled along straight lines.
+With Newton's method as it is run here the claim holds, but for planes and curves alike. Damped, it
+brings the cusp to its line and clamps it (residual 7e-3, with some hundred crossings). Then it is
+lost while the virtual planes are brought in. The curved surfaces begin as a wide wedge, where it
+converges (1e-3), and it is lost on their way to lambda = 1. Undamped, it is lost from the jump of
+the edge on. Our solver reaches equilibrium with every contact surface, without a crossing: at this
+size it is the solver that fails, not the planes. But what planes give is another valve: its free
+edges, nearly twice as long as the way along the planes, lie crumpled near the commissures.
 
-With cusps of L_f = 48.75 mm and virtual planes our solver fails, too, at h = 1.4: it closes without
-a crossing, but no equilibrium is found once the penalties are raised (residual 2.7e+1).
+With cusps of L_f = 48.75 mm and virtual planes our solver fails, too, at h = 1.4: nothing crosses,
+but no equilibrium is found once the penalties are raised (residual 2.7e+1).
+
+The damped method follows the authors' public program in its stages, not in its shell element, its
+material or the sizes of its steps, which may carry it further than here.
 """
 
 
