@@ -229,14 +229,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quality", default="equilibrium", help="or approximate")
     parser.add_argument("--out", type=Path, default=DEMOS.parent / "docs")
     asked = parser.parse_args(arguments)
-    valves = []
+    valves, alphas = [], sorted(asked.alphas)
     try:
         scene = changed(
             load_scene(DEMOS / "experiment_1.toml"),
             mesh={"size": asked.size},
             solver={"quality": asked.quality},
         )
-        for alpha in sorted(asked.alphas):
+        for alpha in alphas:
             valves.append(sutured(scene, alpha))
             print(valves[-1].row, file=sys.stderr, flush=True)
     except AvneoError as error:
@@ -247,7 +247,7 @@ def main(arguments: list[str] | None = None) -> int:
     told = TOLD.format(chord=chord, quality=asked.quality, size=asked.size)
     text = [
         "# How long should a free edge be?",
-        "Written by `python demos/sweep_alpha.py`.",
+        f"Written by `python demos/sweep_alpha.py --alphas {' '.join(f'{a:g}' for a in alphas)}`.",
         textwrap.fill(told, 100),
         "\n".join([HEAD, *(valve.row for valve in valves)]),
         "![sutured valves, nu* and contact over alpha](sweep_alpha.png)",
