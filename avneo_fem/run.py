@@ -14,6 +14,7 @@ from avneo_fem import __version__
 from avneo_fem.compat import MPI, versions
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.valve_input import ValveInput
+from avneo_fem.results.drawing import drawing_of
 from avneo_fem.results.fields import principal_stresses, principal_stretches
 from avneo_fem.results.history import HistoryStep, write_history
 from avneo_fem.results.pictures import PictureError, draw_valve
@@ -145,18 +146,14 @@ def _finish(
 
 def draw_results(given: ValveInput, path: Path, surfaces: list[tuple[Any, Any]]) -> None:
     """Draw cusps, suture lines, commissures and contact curves to a PNG file."""
-    geometry = given.geometry
-    lines = [
-        cusp.suture_line.point(np.linspace(0.0, cusp.suture_line.length, 200))
-        for cusp in geometry.cusps
-    ]
+    drawing = drawing_of(given.geometry, surfaces)
     draw_valve(
         path,
         surfaces,
-        geometry.root.radius,
-        lines,
-        geometry.commissures.points,
-        triple_contact_point=geometry.triple_contact.point,
+        drawing.radius,
+        drawing.suture_lines,
+        drawing.commissures,
+        triple_contact_point=drawing.triple_contact_point,
         title=given.scene.name,
     )
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from avneo_fem.results.pictures import PictureError, draw_valve
+from avneo_fem.results.drawing import Drawing
+from avneo_fem.results.pictures import Panel, PictureError, draw_grid, draw_valve
 
 RADIUS = 12.0
 SIZE = (1000, 350)
@@ -111,4 +112,31 @@ def test_machine_without_egl_is_a_clear_error(tmp_path, monkeypatch):
     points, triangles, line = cusp(0, 5)
     with pytest.raises(PictureError, match="libegl1"):
         draw_valve(tmp_path / "valve.png", [(points, triangles)], RADIUS, [line], points[:3])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_grid_of_valves(tmp_path):
+    """Truth: every valve is in its own field, seen as asked; an empty field is white; cusp 0 lies
+    left of the axis from the aorta, right of it from the ventricle."""
+    points, triangles, line = cusp(0)
+    drawing = Drawing([(points, triangles)], RADIUS, [line], points[:3], None, ())
+    above, below = (Panel(drawing, f"from the {name}", name) for name in ("aorta", "ventricle"))
+    draw_grid(tmp_path / "grid.png", [[above, None], [None, below]], field=(300, 300))
+    found = imread(tmp_path / "grid.png")[..., :3]
+    assert found.shape == (600, 600, 3)
+    assert (found[:300, 300:] == 1.0).all()
+    assert (found[300:, :300] == 1.0).all()
+    hue = np.array([[colorsys.rgb_to_hls(*pixel)[0] for pixel in row] for row in found[::5, ::5]])
+    vivid = np.ptp(found[::5, ::5], axis=2) > 0.4
+    orange = vivid & (np.abs(360.0 * hue - HUES["orange"]) < 12.0)
+    assert orange[:60, :30].sum() > 5 * orange[:60, 30:60].sum()
+    assert orange[60:, 90:].sum() > 5 * orange[60:, 60:90].sum()
+    assert orange[:60, :30].sum() > 100
+
+
+@pytest.mark.parametrize("widths", [(), (0,), (1, 2)])
+def test_grid_must_be_one(tmp_path, widths):
+    """Truth: no rows, empty rows and rows of different lengths are refused, and leave no file."""
+    with pytest.raises(ValueError, match="one length"):
+        draw_grid(tmp_path / "grid.png", [[None] * width for width in widths])
     assert list(tmp_path.iterdir()) == []

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CUSP_COLOURS", "Drawing", "add_legend", "add_light", "add_valve"]
+from avneo_fem.geometry.valve_geometry import ValveGeometry
+
+__all__ = ["CUSP_COLOURS", "Drawing", "add_legend", "add_light", "add_valve", "drawing_of"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int_]
@@ -30,6 +32,23 @@ class Drawing:
     commissures: Array
     triple_contact_point: Array | None
     contact_curves: Sequence[Array]
+
+
+def drawing_of(geometry: ValveGeometry, cusps: Sequence[tuple[Array, Indices]]) -> Drawing:
+    """Cusps, as (points (n, 3) [mm], triangles (m, 3)), with the lines and points of their
+    valve."""
+    lines = [
+        cusp.suture_line.point(np.linspace(0.0, cusp.suture_line.length, 200))
+        for cusp in geometry.cusps
+    ]
+    return Drawing(
+        cusps,
+        geometry.root.radius,
+        lines,
+        geometry.commissures.points,
+        geometry.triple_contact.point,
+        (),
+    )
 
 
 def add_valve(plotter: Any, pyvista: Any, drawing: Drawing, lower: float, upper: float) -> None:

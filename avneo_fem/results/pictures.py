@@ -1,71 +1,37 @@
-"""The picture of the valve, drawn off-screen with PyVista."""
+"""Pictures of valves, drawn off-screen with PyVista."""
 
 from __future__ import annotations
 
-import ctypes
-import os
-import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from avneo_fem.errors import AvneoError
-from avneo_fem.results.drawing import Drawing, add_legend, add_light, add_valve
-from avneo_fem.results.writing import written_whole
+from avneo_fem.results.drawing import Drawing, add_legend
+from avneo_fem.results.rendering import VIEWS, PictureError, add_view, picture
 
-__all__ = ["PictureError", "draw_valve"]
+__all__ = ["Panel", "PictureError", "draw_grid", "draw_valve"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int_]
 
-_VIEWS = (
-    ("from the aorta", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
-    ("from the ventricle", (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
-    ("from the side", (1.0, -0.75, 0.75), (0.0, 0.0, 1.0)),
-)
+
+@dataclass(frozen=True)
+class Panel:
+    """One field of a grid of valves: what, seen from where (a name in ``VIEWS``), and its label."""
+
+    drawing: Drawing
+    view: str
+    label: str
 
 
-class PictureError(AvneoError):
-    """The picture cannot be drawn on this machine; the results are not affected."""
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
-
-
-def _pyvista() -> Any:
-    """PyVista, set up to draw without a display.
-
-    Raises
-    ------
-    PictureError
-        When it is not installed, or when VTK would end the process rather than raise.
-    """
-    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        # VTK ends the process without it
-        if not _loads("libEGL.so.1"):
-            raise PictureError("valve.png needs libEGL.so.1 (Debian package libegl1)")
-    try:
-        import pyvista
-    except ImportError as error:
-        raise PictureError(f"valve.png needs pyvista (pip install '.[viz]'): {error}") from None
-    return pyvista
-
-
-def _demand_renderer(plotter: Any) -> None:
-    """Raise PictureError where VTK's last resort is left: without its library it would crash."""
-    if plotter.render_window.GetClassName() == "vtkOSOpenGLRenderWindow" and not any(
-        map(_loads, ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"))
-    ):
-        raise PictureError("valve.png: VTK finds no display, no EGL device and no OSMesa here")
+def _heights(drawing: Drawing) -> tuple[float, float]:
+    """Part of the root that the cusps need, with a margin [mm]."""
+    heights = np.concatenate([points[:, 2] for points, _ in drawing.cusps])
+    margin = 0.15 * drawing.radius
+    return float(heights.min() - margin), float(heights.max() + margin)
 
 
 def draw_valve(
@@ -111,45 +77,52 @@ def draw_valve(
     PictureError
         When this machine cannot draw it.
     """
-    pyvista = _pyvista()
     drawing = Drawing(
         cusps, radius, suture_lines, commissures, triple_contact_point, contact_curves
     )
-    heights = np.concatenate([points[:, 2] for points, _ in cusps])
-    margin = 0.15 * radius
-    lower, upper = height_range or (heights.min() - margin, heights.max() + margin)
-    middle = np.array([0.0, 0.0, (lower + upper) / 2.0])
-    plotter = None
-    try:
-        plotter = pyvista.Plotter(
-            off_screen=True,
-            shape=(1, len(_VIEWS) + 1),
-            col_weights=[1.0] * len(_VIEWS) + [0.33],
-            window_size=list(size),
-            border=False,
-        )
-        _demand_renderer(plotter)
-        for number, (label, direction, up) in enumerate(_VIEWS):
+    heights = height_range or _heights(drawing)
+    count = len(VIEWS)
+    with picture(path, size, shape=(1, count + 1), col_weights=[1.0] * count + [0.33]) as drawn:
+        plotter, pyvista = drawn
+        for number, view in enumerate(VIEWS):
             plotter.subplot(0, number)
-            plotter.set_background("white")
-            add_valve(plotter, pyvista, drawing, lower, upper)
-            along = np.asarray(direction) / np.linalg.norm(direction)
-            plotter.camera.position = middle + 8.0 * radius * along
-            plotter.camera.focal_point = middle
-            plotter.camera.up = up
-            plotter.enable_parallel_projection()
-            plotter.camera.parallel_scale = 1.3 * radius
-            plotter.renderer.reset_camera_clipping_range()
-            plotter.add_text(label, position="lower_edge", font_size=11, color="black")
-            add_light(plotter, pyvista)
-        plotter.subplot(0, len(_VIEWS))
+            add_view(plotter, pyvista, drawing, view, heights, view)
+        plotter.subplot(0, count)
         plotter.set_background("white")
         add_legend(plotter, pyvista, drawing, title)
-        plotter.enable_anti_aliasing("ssaa")
-        with written_whole(path) as temporary:
-            plotter.screenshot(str(temporary))
-    except RuntimeError as error:
-        raise PictureError(f"{path}: VTK cannot draw here: {error}") from error
-    finally:
-        if plotter is not None:
-            plotter.close()
+
+
+def draw_grid(
+    path: str | Path, rows: Sequence[Sequence[Panel | None]], *, field: tuple[int, int] = (600, 640)
+) -> None:
+    """Draw several valves as a grid, all to the same scale if their roots are, as a PNG file.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``….png``, written whole or not at all.
+    rows : sequence of sequences of Panel or None
+        All rows of one length; None leaves a field white.
+    field : (int, int)
+        Width and height of one field [pixels].
+
+    Raises
+    ------
+    ValueError
+        For rows that are empty or of different lengths.
+    PictureError
+        When this machine cannot draw it.
+    """
+    widths = {len(row) for row in rows}
+    if len(widths) != 1 or widths == {0}:
+        raise ValueError(f"rows must be of one length, at least 1; got {sorted(widths)}")
+    shape = (len(rows), widths.pop())
+    with picture(path, (field[0] * shape[1], field[1] * shape[0]), shape=shape) as drawn:
+        plotter, pyvista = drawn
+        for i, row in enumerate(rows):
+            for j, panel in enumerate(row):
+                plotter.subplot(i, j)
+                plotter.set_background("white")
+                if panel is not None:
+                    heights = _heights(panel.drawing)
+                    add_view(plotter, pyvista, panel.drawing, panel.view, heights, panel.label)
