@@ -31,6 +31,8 @@ _BOUNDARY_DAMPING, SETTLE_DAMPING = 1.5, 0.6
 _BOUNDARY_ITERATIONS = 6
 #: iterations after a part of the way to the line of a finer mesh
 _REST_ITERATIONS = 40
+#: angle from which on an edge is turned gently [rad]
+_FAR = np.radians(60.0)
 
 
 class CuspMoves:
@@ -46,6 +48,7 @@ class CuspMoves:
         self.setup, self.options = setup, setup.scene.solver
         self._way: Floats = np.zeros((0, 3))
         self._said = ""
+        self._clamp_rounds = 0
 
     def _penalties(self) -> tuple[_Penalty, ...]:
         setup = self.setup
@@ -137,7 +140,32 @@ class CuspMoves:
             moved, _ = relaxation.settle(moved, tolerance, SETTLE_DAMPING, _REST_ITERATIONS)
             return moved, reason
         # ``_move`` has left no crossing behind
-        return self._settle(moved, self._turned(moved, self.setup.row.has_room, 1.0))
+        return self._clamp_again(moved)
+
+    def _ease_clamp(self, points: Floats) -> None:
+        """Soften the clamp where a finer mesh finds room that the coarse one did not see.
+
+        An edge that was left to turn may then be far from its half-plane: at once, the clamp would
+        tear its triangle round through whatever lies in between.
+        """
+        clamp = self.setup.clamp
+        angles = np.abs(clamp.angles(points)[clamp.active])
+        self._clamp_rounds = self.options.clamp_steps if angles.max(initial=0.0) > _FAR else 0
+        clamp.stiffness /= 4.0**self._clamp_rounds
+
+    def _clamp_again(self, state: Floats) -> Outcome:
+        """Turn the edges into their half-planes on a finer mesh, as gently as it needs."""
+        rounds, room = self._clamp_rounds, self.setup.row.has_room
+        if not rounds:
+            return self._settle(state, self._turned(state, room, 1.0))
+        for number in range(rounds):
+            self.setup.clamp.stiffness *= 4.0
+            turned = self._turned(state, room, 1.0 / (rounds - number))
+            settled, reason = self._settle(state, turned)
+            if settled is None:
+                return None, reason
+            state = settled
+        return state, reason
 
     def _turned(self, state: Floats, chosen: NDArray[np.bool_], share: float) -> Floats:
         """State with chosen suture edges (k-1,) turned by a share of what is missing to the

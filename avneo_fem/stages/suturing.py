@@ -158,6 +158,7 @@ class CuspSuturing(PenaltyRaising):
         ]
         for earlier in self.levels[: self.levels.index(level)]:
             self._activate(earlier, earlier.stop)
+        self._ease_clamp(points)
         return self._begin()
 
     def _go_on_from(self, checkpoint: Checkpoint) -> Floats:
