@@ -291,8 +291,14 @@ class ShellModel:
         return sp.csr_matrix((values, columns, rows), shape=self._matrix.size)
 
     def load_scale(self) -> float:
-        """P x area of the template [mN]; residuals are given relative to it."""
-        return self.parameters.pressure * self.mesh.area
+        """Force that residuals are given relative to [mN].
+
+        P x area of the template, or, where that is less, the membrane force of a strain of 0.5 %
+        across it: without much pressure, gathering is what loads a cusp.
+        """
+        given, area = self.parameters, self.mesh.area
+        membrane = _LOADING_STRAIN * given.young_modulus * given.thickness * np.sqrt(area)
+        return float(max(given.pressure * area, membrane))
 
     def energy(self, state: Floats) -> float:
         """Membrane, bending and free-edge energy [mN mm]."""
