@@ -20,6 +20,7 @@ from avneo_fem.scene_method import (
     Solver,
     Wall,
 )
+from avneo_fem.scene_scaling import scaled_scene
 from avneo_fem.scene_schema import FIDELITIES, Scene
 from avneo_fem.scene_tables import (
     Commissures,
@@ -52,4 +53,5 @@ __all__ = [
     "Wall",
     "load_scene",
     "parse_scene",
+    "scaled_scene",
 ]
