@@ -100,7 +100,6 @@ def _angle_cases() -> list[ExtremeCase]:
         ((75.0, 75.0, 30.0), 1.5, 0.6, 1.3),
         ((110.0, 35.0, 35.0), 1.5, 0.7, 1.3),
         ((82.5, 82.5, 15.0), 1.5, 0.7, 1.0),
-        ((120.0, 30.0, 30.0), 1.2, 0.75, 1.2),
     ):
         text = "-".join(f"{angle:g}" for angle in angles)
         entries = _with_depths({**BASE, "mesh.size": size}, angles)
@@ -116,27 +115,30 @@ def _angle_cases() -> list[ExtremeCase]:
                 patience=2.0,
             )
         )
-    sharp = (150.0, 15.0, 15.0)
-    entries = proportioned(_with_depths({**BASE, "mesh.size": 1.0}, sharp), 1.5, 0.8)
-    cases += [
-        ExtremeCase(
-            "angles-150-15-15",
-            "angles",
-            "150 15 15",
-            "commissure triangle of 150, 15 and 15 degrees",
-            entries,
-            infeasible="the curved contact surfaces of the two narrow cusps cross",
-            diagnosis=r"the contact curves of cusp \d cross each other",
-        ),
-        ExtremeCase(
-            "angles-150-15-15-planes",
-            "angles",
-            "150 15 15\nplanes",
-            "the same with virtual planes, which do not cross",
-            {**entries, "contact.method": "virtual_planes"},
-            patience=2.0,
-        ),
-    ]
+    for angles, alpha in (((120.0, 30.0, 30.0), 1.3), ((150.0, 15.0, 15.0), 1.5)):
+        text = "-".join(f"{angle:g}" for angle in angles)
+        shape = _with_depths({**BASE, "mesh.size": 1.0}, angles)
+        entries = proportioned(shape, alpha, 0.8)
+        about = f"commissure triangle of {text} degrees"
+        cases += [
+            ExtremeCase(
+                f"angles-{text}",
+                "angles",
+                text.replace("-", " "),
+                about,
+                entries,
+                infeasible="the curved contact surfaces of the two narrow cusps cross",
+                diagnosis=r"the contact curves of cusp \d cross each other",
+            ),
+            ExtremeCase(
+                f"angles-{text}-planes",
+                "angles",
+                text.replace("-", " ") + "\nplanes",
+                f"{about}, with virtual planes as contact surfaces, which do not cross",
+                {**entries, "contact.method": "virtual_planes"},
+                patience=2.0,
+            ),
+        ]
     cases.append(
         ExtremeCase(
             "angles-flat",
