@@ -39,6 +39,16 @@ def _line(case: ExtremeCase, outcome: Outcome) -> str:
     return text + (f"  {escape(outcome.message[:100])}" if outcome.message else "")
 
 
+def _write(folder: Path, ended: Ended, console: Console) -> None:
+    """Table and picture of what has ended so far, so that a killed map leaves them."""
+    write_table(folder / "extremes.csv", ended)
+    try:
+        draw_map(folder / "extremes.png", ended)
+    except PictureError as error:
+        if len(ended) == 1:
+            console.print(f"[yellow]{escape(str(error))}[/]")
+
+
 def run_map(
     cases: Sequence[ExtremeCase],
     folder: Path,
@@ -89,11 +99,8 @@ def run_map(
                     outcome = run(case, home, reference, limit)
                     progress.console.print(_line(case, outcome))
                 ended.append((case, outcome))
-                write_table(folder / "extremes.csv", ended)
+                _write(folder, ended, console)
                 progress.advance(task)
-        draw_map(folder / "extremes.png", ended)
-    except PictureError as error:
-        console.print(f"[yellow]{escape(str(error))}[/]")
     except OSError as error:
         reason = f"cannot be used ({error.strerror})"
         raise SceneError("output folder", str(folder), reason) from None

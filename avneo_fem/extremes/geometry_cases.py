@@ -205,8 +205,8 @@ def _gap_cases() -> list[ExtremeCase]:
             "0",
             "no gap: neighbouring cusps share a straight part of their suture lines",
             {**BASE, "commissures.gap": 0.0},
-            infeasible="the sutured edges of neighbours coincide, so the cusps touch",
-            diagnosis=r"gap|cross each other",
+            infeasible="neighbouring cusps would be sewn to the same line",
+            diagnosis=r"commissures\.gap = 0\.0: must be above 0",
         ),
         ExtremeCase(
             "gap-26",

@@ -19,7 +19,7 @@ from avneo_fem.stages.record import CuspResult
 __all__ = ["constraints_of", "surface_of", "tolerances_of"]
 
 #: how far a sutured node may be off its line, in units of R: rounding of the way there
-_SUTURE = 1e-7
+_SUTURE = 8e-8
 
 
 def surface_of(geometry: ValveGeometry, result: CuspResult) -> CuspSurface:
