@@ -163,7 +163,7 @@ def extremes(
     with_long: Annotated[bool, typer.Option("--long", help="fine meshes, too")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="keep cases that have ended")] = False,
     time_limit: Annotated[
-        float, typer.Option(min=1.0, metavar="S", help="seconds that a case may take")
+        float, typer.Option(min=1.0, metavar="S", help="processor time of a case [s]")
     ] = 300.0,
 ) -> None:
     """Suture scenes far from the paper's and say how each ends; status 1 if one shows a bug."""
