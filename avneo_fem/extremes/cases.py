@@ -22,7 +22,7 @@ from avneo_fem.extremes.shaping import (
 
 __all__ = ["all_cases", "selected"]
 
-#: an inflated neo-Hookean tube of Poisson ratio 0 has no equilibrium above about this P R / (E H)
+#: a tube of radius R under P is strained by about P R / (E H) while that is small; 0.2 in the base
 _INFLATION = "P R / (E H) = {:.2g}: the pressure stretches the membrane several times over"
 
 
