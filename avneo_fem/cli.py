@@ -151,6 +151,30 @@ def plot(folder: Annotated[Path, typer.Argument(metavar="DIR", help="results of 
     draw_results(given, folder / "valve.png", surfaces)
 
 
+@app.command()
+def extremes(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="results of every case")
+    ] = Path("out/extremes"),
+    only: Annotated[
+        str, typer.Option(metavar="PATTERN", help="cases or groups that match this expression")
+    ] = "",
+    with_long: Annotated[bool, typer.Option("--long", help="fine meshes, too")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="keep cases that have ended")] = False,
+    time_limit: Annotated[
+        float, typer.Option(min=1.0, metavar="S", help="processor time of a case [s]")
+    ] = 300.0,
+) -> None:
+    """Suture scenes far from the paper's and say how each ends; status 1 if one shows a bug."""
+    from avneo_fem.extremes.campaign import run_map
+    from avneo_fem.extremes.cases import all_cases, selected
+    from avneo_fem.extremes.table import bugs
+
+    cases = selected(all_cases(), only, with_long)
+    if bugs(run_map(cases, output, _people, resume=resume, limit=time_limit)):
+        raise typer.Exit(1)
+
+
 def _tell_error(error: AvneoError) -> None:
     _people.print(f"[bold red]avneo:[/] {escape(str(error))}")
     sys.stderr.flush()

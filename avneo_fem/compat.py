@@ -169,10 +169,10 @@ def match_points(coordinates: NDArray[np.float64], points: NDArray[np.float64]) 
     Raises
     ------
     RuntimeError
-        When a point has no row of its own within 1e-8 mm.
+        When a point has no row of its own within 1e-9 of their extent.
     """
     distance, rows = cKDTree(coordinates[:, :2]).query(points)
-    if distance.max() > 1e-8 or len(np.unique(rows)) != len(points):
+    if distance.max() > 1e-9 * np.ptp(points, axis=0).max() or len(np.unique(rows)) != len(points):
         raise RuntimeError("finite-element nodes do not match the mesh they were made from")
     return rows.astype(np.int64)
 

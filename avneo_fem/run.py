@@ -63,10 +63,17 @@ def run_scene(
     Raises
     ------
     SceneError
-        When a template cannot be meshed or placed as asked, or ``folder`` cannot be written to;
-        a folder that was made for the run is then removed.
+        When neighbours share a suture line, a template cannot be meshed or placed as asked, or
+        ``folder`` cannot be written to; a folder that was made for the run is then removed.
     """
     clock = time.perf_counter()
+    if only is None and given.scene.commissures.gap == 0.0:
+        raise SceneError(
+            "commissures.gap",
+            0.0,
+            "must be above 0 for a valve: neighbouring cusps would be sewn to the same line, and"
+            " cannot keep apart; a single cusp can be sutured (--cusp)",
+        )
     meshes = mesh_templates(given)
     is_new = not folder.exists()
     comm.Barrier()

@@ -22,6 +22,7 @@ from avneo_fem.scene_method import (
     Solver,
     Wall,
 )
+from avneo_fem.scene_scaling import scaled_scene
 from avneo_fem.scene_schema import Scene
 from avneo_fem.scene_tables import (
     Commissures,
@@ -55,4 +56,5 @@ __all__ = [
     "Wall",
     "load_scene",
     "parse_scene",
+    "scaled_scene",
 ]

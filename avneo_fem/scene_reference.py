@@ -16,7 +16,7 @@ from avneo_fem.scene_fields import entry_schema, valid_values
 __all__ = ["scene_reference"]
 
 _FIRST = ("root", "commissures", "template", "suture_line")
-_UNIT = re.compile(r" ?\[([^\]]+)\]")
+_UNIT = re.compile(r" ?\[(mm|kPa|mN|degrees)\]")
 
 _INTRODUCTION = """# The scene file
 

@@ -167,6 +167,15 @@ def test_bad_scenes_found_by_suture_only(
     assert [path.name for path in out.iterdir()] == ["notes.txt"]
 
 
+def test_no_gap_leaves_no_valve(tmp_path: Path) -> None:
+    """Truth: neighbours on one line touch, so a valve without a gap is refused by ``suture``; its
+    geometry can be looked at."""
+    scene, out = written(f"{SMALL}\n[commissures]\ngap = 0.0\n", tmp_path), tmp_path / "out"
+    one_line(avneo_inside("suture", scene, "-o", out), "commissures.gap = 0.0", "must be above 0")
+    assert not out.exists()
+    assert avneo_inside("check", scene).returncode == 0
+
+
 def test_a_mesh_too_coarse_keeps_old_results(tmp_path: Path) -> None:
     """Truth: bad input is found before the report of an older run is removed."""
     scene, out = written(COARSE, tmp_path), tmp_path / "out"

@@ -167,7 +167,8 @@ def test_tolerances(tables: dict[str, Any], cusps: float, wall: float) -> None:
     assert found.cusp_distance_mm == pytest.approx(cusps, rel=1e-12)
     assert found.wall_distance_mm == pytest.approx(wall)
     assert (found.residual, found.inside_mm) == (1e-7, 0.03)
-    assert found.suture_mm == 1e-6
+    assert found.suture_mm == pytest.approx(8e-8 * scene.root.radius)
+    assert found.sag_mm == scene.free_edge.width
     assert found.clamp_deg == 5.0
 
 

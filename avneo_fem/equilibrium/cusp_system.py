@@ -18,6 +18,9 @@ __all__ = ["CuspSystem"]
 
 Floats = NDArray[np.float64]
 
+#: arm at which moments on director angles count as forces, in units of the thickness H
+MOMENT_ARM = 2.0
+
 
 class CuspSystem:
     """Residual, tangent and merit of one cusp.
@@ -45,6 +48,8 @@ class CuspSystem:
         self.dead_load: Floats | None = None
         self.force_scale: float | None = None
         self.fixed = np.zeros(model.size, dtype=bool)
+        self._arms = np.ones(model.size)
+        self._arms[model.angle_dofs.ravel()] = MOMENT_ARM * model.parameters.thickness
         self._expand = self._expansion()
 
     def _expansion(self) -> sp.csr_matrix:
@@ -71,6 +76,18 @@ class CuspSystem:
         """Force that residuals are given relative to [mN]."""
         return self.model.load_scale() if self.force_scale is None else self.force_scale
 
+    def magnitude(self, forces: Floats, dofs: NDArray[np.int64]) -> float:
+        """Norm of generalised forces on ``dofs`` [mN]: a moment counts as a force at an arm of 2 H.
+
+        Forces and moments have no common unit: without an arm a convergence test would depend on
+        the unit of length.
+        """
+        return float(np.linalg.norm(forces / self._arms[dofs]))
+
+    def energy_scale(self) -> float:
+        """Energy that is lost in rounding [mN mm]: 2e-4 of the load times H."""
+        return 1e-4 * self.load_scale() * MOMENT_ARM * self.model.parameters.thickness
+
     def _active(self, extra: Sequence[Term]) -> list[Term]:
         contact = [] if self.contact is None else [self.contact]
         return [*contact, *self.terms, *extra]
@@ -92,7 +109,8 @@ class CuspSystem:
 
     def relative_residual(self, state: Floats) -> float:
         """Norm of the undamped residual over the load scale."""
-        return float(np.linalg.norm(self.residual(state)[self.free]) / self.load_scale())
+        free = self.free
+        return self.magnitude(self.residual(state)[free], free) / self.load_scale()
 
     def tangent(self, state: Floats, extra: Sequence[Term] = ()) -> sp.csr_matrix:
         """Derivative of :meth:`residual`, (size, size)."""

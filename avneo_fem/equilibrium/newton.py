@@ -118,15 +118,17 @@ class NewtonSolver:
         self._note_step(x.array_r - self._base[self._free])
         self._base = self._full(x)
         self._base_energy = self.system.energy(self._base, self._extra)
-        self._energy_scale = max(abs(self._base_energy), 1.0)
+        self._energy_scale = max(abs(self._base_energy), self.system.energy_scale())
         self._base_residual = self.system.residual(self._base, self._extra)
         tangent = self.system.tangent(self._base, self._extra)
         self._tangent = tangent[self._free][:, self._free].tocsr()
 
-    def _converged(self, _snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
+    def _converged(self, snes: Any, iteration: int, norms: tuple[float, float, float]) -> int:
         if not np.isfinite(norms[2]):
             return -4
-        return 2 if norms[2] <= self._target else 0
+        # PETSc's norm adds forces to moments
+        force = self.system.magnitude(snes.getFunction()[0].array_r, self._free)
+        return 2 if force <= self._target else 0
 
     # -- Newton direction --------------------------------------------------------------------
     def apply(self, _pc: Any, right: Any, left: Any) -> None:
@@ -138,7 +140,7 @@ class NewtonSolver:
     def _descent(self, force: Floats) -> Floats:
         """Newton direction of a model made convex by the smallest shift of a geometric series."""
         settings = self.settings
-        close = bool(np.linalg.norm(force) < settings.exact_below * self._scale)
+        close = self.system.magnitude(force, self._free) < settings.exact_below * self._scale
         shift = 0.0 if close and not self._hold else self._shift
         if close and self._convex:
             # the iteration before was convex, and steps are small now: its inertia will do
@@ -280,7 +282,8 @@ class NewtonSolver:
             for held in (*self._work, x):
                 held.destroy()
         self.iterations += iterations
-        residual = float(np.linalg.norm(system.residual(result, extra)[self._free]) / self._scale)
+        out_of_balance = system.residual(result, extra)[self._free]
+        residual = system.magnitude(out_of_balance, self._free) / self._scale
         text = _REASONS.get(reason, f"SNES reason {reason}")
         seconds = time.perf_counter() - clock
         return result, Verdict(residual <= tolerance, text, iterations, residual, seconds)

@@ -161,10 +161,12 @@ class ContactWedgeFamily:
         straight = np.stack([_segment(self._ends[cusp_index], self._ends[i]) for i in ends])
         section = PlanarWedge(lam * self._polygons[ends] + (1.0 - lam) * straight)
         if section.crosses_itself():
+            lengths = np.asarray(self.contact_lengths)
             raise SceneError(
                 "template.free_edge_length",
-                self.contact_lengths.tolist(),
+                # l_i = c_j + c_k, to the digits that were given
+                [float(f"{length:.12g}") for length in lengths.sum() - lengths],
                 f"the contact curves of cusp {cusp_index} cross each other at lambda = {lam:g}; "
-                "use cusps of less unequal free edges",
+                'use cusps of less unequal free edges, or contact.method = "virtual_planes"',
             )
         return ContactWedge(section, self.commissures, cusp_index, float(lam))

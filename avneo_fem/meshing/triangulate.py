@@ -17,6 +17,8 @@ __all__ = ["TemplateOutline", "triangulate_template"]
 Floats = NDArray[np.float64]
 
 _NOWHERE: Floats = np.empty(0)
+#: to what the outline is rounded, in units of the edge length
+_GRID = 2.0**-30
 
 
 class _Path(Protocol):
@@ -92,7 +94,20 @@ def triangulate_template(
 
 
 def _fill(outline: Floats, size: float) -> tuple[Floats, NDArray[np.int64]]:
-    """Triangles inside a counter-clockwise polygon, whose points come first in the result."""
+    """Triangles inside a counter-clockwise polygon, whose points come first in the result.
+
+    gmsh sees lengths in units of ``size``, rounded: its tolerances are absolute, and where two
+    points would do equally well the last bit decides which it takes. So the same template in
+    another unit has the same mesh.
+    """
+    points, triangles = _fill_units(np.round(outline / size / _GRID) * _GRID)
+    points *= size
+    points[: len(outline)] = outline
+    return points, triangles
+
+
+def _fill_units(outline: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """The same with a target edge length of 1."""
     interrupt = signal.getsignal(signal.SIGINT)  # before the import, which resets it already
     import gmsh
 
@@ -104,14 +119,14 @@ def _fill(outline: Floats, size: float) -> tuple[Floats, NDArray[np.int64]]:
             ("Mesh.Algorithm", 6),
             ("Mesh.MeshSizeExtendFromBoundary", 0),
             ("Mesh.MeshSizeFromPoints", 0),
-            ("Mesh.MeshSizeMin", size),
-            ("Mesh.MeshSizeMax", size),
+            ("Mesh.MeshSizeMin", 1.0),
+            ("Mesh.MeshSizeMax", 1.0),
             ("Mesh.RandomSeed", 1),
         ):
             gmsh.option.setNumber(option, value)
         gmsh.model.add("cusp")
         geo = gmsh.model.geo
-        corners = [geo.addPoint(x, y, 0.0, size) for x, y in outline]
+        corners = [geo.addPoint(x, y, 0.0, 1.0) for x, y in outline]
         lines = [
             geo.addLine(start, stop)
             for start, stop in zip(corners, corners[1:] + corners[:1], strict=True)
@@ -138,7 +153,6 @@ def _fill(outline: Floats, size: float) -> tuple[Floats, NDArray[np.int64]]:
     renumber = np.full(len(xy), -1)
     renumber[order] = np.arange(len(order))
     points = xy[order].copy()
-    points[: len(outline)] = outline
     cells = renumber[cells]
     u, v = points[cells[:, 1]] - points[cells[:, 0]], points[cells[:, 2]] - points[cells[:, 0]]
     flipped = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] < 0

@@ -18,6 +18,9 @@ from avneo_fem.stages.record import CuspResult
 
 __all__ = ["constraints_of", "surface_of", "tolerances_of"]
 
+#: how far a sutured node may be off its line, in units of R: rounding of the way there
+_SUTURE = 8e-8
+
 
 def surface_of(geometry: ValveGeometry, result: CuspResult) -> CuspSurface:
     """Mid-surface of a result and what its edges were asked to do."""
@@ -85,7 +88,7 @@ def tolerances_of(given: ValveInput) -> Tolerances:
     if scene.solver.quality == "approximate":
         # no equilibrium and no clearance is claimed, but no crossing, and inside
         inside = scene.inside_tolerance(min(cusp.thickness for cusp in geometry.cusps))
-        return Tolerances(residual=np.inf, inside_mm=inside)
+        return Tolerances(residual=np.inf, inside_mm=inside, **_edges(scene))
     halves = sorted(cusp.thickness / 2 for cusp in geometry.cusps)
     wedge = (
         halves[0] + halves[1] if scene.contact.clearance is None else 2 * scene.contact.clearance
@@ -101,4 +104,10 @@ def tolerances_of(given: ValveInput) -> Tolerances:
             halves[0] if scene.wall.clearance is None else scene.wall.clearance, 0.0
         ),
         layer_distance_mm=scene.layer_clearance(2 * halves[0]),
+        **_edges(scene),
     )
+
+
+def _edges(scene: Scene) -> dict[str, float]:
+    """What sutured and free edges may be off by: nothing, and the width eta_2 of (1.6) [mm]."""
+    return {"suture_mm": _SUTURE * scene.root.radius, "sag_mm": scene.free_edge.width}
