@@ -92,7 +92,8 @@ class Wall(Table):
         None, description="d_0 of the mid-surface away from the suture [mm]; default H/2"
     )
     taper: NonNegative | None = Field(
-        None, description="distance over which d_0 grows from the suture [mm]; default 5 H"
+        None,
+        description="distance over which d_0 grows from the suture [mm]; default 5 H, at least 2 h",
     )
     growth: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
         10.0, description="factor at most by which eta_1 is raised until the cusp is inside"

@@ -38,7 +38,7 @@ def _spelled_out(scene: Scene) -> dict[str, Any]:
     for table, key, value in (
         ("contact", "clearance", h / 2),
         ("wall", "clearance", h / 2),
-        ("wall", "taper", 5 * h),
+        ("wall", "taper", scene.wall_taper(h)),
         ("layers", "clearance", scene.layer_clearance(h)),
         ("layers", "unrestricted", scene.layers_unrestricted(h)),
         ("solver", "barrier_distance", min(0.3 * h, 0.2 * scene.mesh_size)),

@@ -85,6 +85,14 @@ class Scene(Table):
             return chosen
         return max(0, int(np.floor(np.log2(self.root.radius / 4 / self.mesh_size))))
 
+    def wall_taper(self, thickness: float) -> float:
+        """Distance over which the clearance of a cusp of this thickness from the wall grows [mm].
+
+        Not less than two triangles: the first row lies along the wall.
+        """
+        chosen = self.wall.taper
+        return max(5.0 * thickness, 2.0 * self.mesh_size) if chosen is None else chosen
+
     def layer_clearance(self, thickness: float) -> float:
         """Distance that layers of a cusp of this thickness keep away from its suture [mm]."""
         chosen = self.layers.clearance

@@ -64,9 +64,7 @@ def test_meshes_scale(length: float) -> None:
     """Truth: nested meshes of the same template in another unit: same triangles, same points."""
     scene = parse_scene({"mesh": {"size": 1.5}})
     other = parse_scene(scaled_scene(scene, length))
-    first, second = (
-        next(iter(mesh_templates(ValveInput.from_scene(each)).values())) for each in (scene, other)
-    )
+    first, second = (mesh_templates(ValveInput.from_scene(each))[0] for each in (scene, other))
     for mesh, scaled in zip(first, second, strict=True):
         assert (scaled.triangles == mesh.triangles).all()
         assert scaled.points / length == pytest.approx(mesh.points, abs=1e-12)

@@ -156,10 +156,13 @@ def test_directors_start_upright_and_are_copied() -> None:
 
 
 def test_load_scale() -> None:
-    """Truth: P x area of the template."""
-    assert shell(strip(4, 3, 2.0, 1.0), bending=False, pressure=5.0).load_scale() == pytest.approx(
-        10.0
-    )
+    """Truth: P x area of the template; without pressure 0.005 E H sqrt(area)."""
+    mesh = strip(4, 3, 2.0, 1.0)
+    assert shell(mesh, bending=False, pressure=5.0).load_scale() == pytest.approx(10.0)
+    model = shell(mesh, bending=False, pressure=0.0)
+    given = model.parameters
+    expected = 0.005 * given.young_modulus * given.thickness * np.sqrt(2.0)
+    assert model.load_scale() == pytest.approx(expected)
 
 
 def test_answers_do_not_share_memory() -> None:

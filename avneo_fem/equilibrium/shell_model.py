@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _FREE_EDGE = 1
+#: strain whose membrane force stands for the load where there is little pressure
+_LOADING_STRAIN = 0.005
 
 #: Entries of the one constant vector in the kernels
 _CONSTANTS: dict[str, int | slice] = {

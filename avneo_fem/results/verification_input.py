@@ -56,7 +56,7 @@ def constraints_of(
         plane_point=plane.points[0],
         plane_normal=plane.normal,
         free_edge_clearance=scene.free_edge.clearance,
-        taper=5 * thickness if scene.wall.taper is None else scene.wall.taper,
+        taper=scene.wall_taper(thickness),
         layer_clearance=scene.layer_clearance(thickness),
         unrestricted=scene.layers_unrestricted(thickness),
     )

@@ -32,12 +32,12 @@ def clearances(scene: Scene, index: int, distance_to_suture: Floats) -> tuple[Fl
     """d_0 of every node from wall and contact wedge [mm] (design.md §1, reading of (1.5)).
 
     From the wedge half the thickness; from the wall the same, tapered so that the cusp can leave
-    its sutured edge along the wall: H/2 min(1, s/5H)^2 at distance s from the suture.
+    its sutured edge along the wall: H/2 min(1, s/taper)^2 at distance s from the suture.
     """
     thickness = scene.cusp[index].template.thickness
     wedge = thickness / 2 if scene.contact.clearance is None else scene.contact.clearance
     wall = thickness / 2 if scene.wall.clearance is None else scene.wall.clearance
-    taper = 5 * thickness if scene.wall.taper is None else scene.wall.taper
+    taper = scene.wall_taper(thickness)
     share = np.ones(len(distance_to_suture))
     if taper > 0:
         share = np.square(np.minimum(1.0, distance_to_suture / taper))
