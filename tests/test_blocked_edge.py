@@ -16,6 +16,7 @@ from avneo_fem.meshing.refine import nested_meshes
 from avneo_fem.scene import parse_scene
 from avneo_fem.stages.blocked_edge import LaidRow
 from avneo_fem.stages.cusp_setup import CuspSetup
+from avneo_fem.valve.suture_valve import mesh_templates
 from valve_cases import DEMOS
 
 RADIUS = 12.0
@@ -301,3 +302,24 @@ def test_steps_of_the_way_add_up(row: LaidRow, angle: np.ndarray) -> None:
     start = placed(row, np.array([0.8, 1.2, 0.5]), angle, np.array([0.3, -0.4, 0.1]))
     found = row.on_the_way(row.on_the_way(start, 0.3), 0.4)
     np.testing.assert_allclose(found, row.on_the_way(start, 1 - 0.7 * 0.6), atol=1e-14)
+
+
+def test_a_corner_that_cannot_be_laid_down() -> None:
+    """Truth: Experiment 2's cusp 0 has no room at its corners; on a mesh that has no node where the
+    suture line begins to turn, that turn is nearer than the row can follow, so the corner's edges
+    are left: neither laid down nor clamped. With a node there the line is straight up to it, and
+    they are laid down."""
+    left = made(1.4, 1, 2).row
+    assert np.flatnonzero(left.is_left).tolist() == [0, len(left.is_left) - 1]
+    assert not (left.is_left & left.is_blocked).any()
+    assert not made(1.4, 1, 2).clamp.active[[0, -1]].any()
+    np.testing.assert_array_equal(left.has_room, ~(left.is_blocked | left.is_left))
+    data = tomllib.loads((DEMOS / "experiment_2.toml").read_text()) | {"mesh": {"size": 1.4}}
+    given = ValveInput.from_scene(parse_scene(data))
+    mesh = mesh_templates(given)[0][-1]
+    joints = given.geometry.cusps[0].suture_joints()
+    np.testing.assert_allclose(given.geometry.cusps[0].sutured_position(joints)[:, 2], -2.5)
+    assert np.isin(joints, mesh.suture_arc_length).all()
+    row = CuspSetup(given.scene, given.geometry, given.wedges, 0, mesh).row
+    assert not row.is_left.any()
+    assert row.is_blocked[[0, -1]].all()

@@ -35,7 +35,7 @@ def test_nothing_is_left_to_a_default() -> None:
     for table in ("contact", "wall", "layers", "solver", "mesh"):
         assert None not in getattr(scaled, table).model_dump().values()
     assert scaled.contact.clearance == pytest.approx(0.25e-3)
-    assert scaled.wall.taper == pytest.approx(2.5e-3)
+    assert scaled.wall.taper == pytest.approx(3e-3)  # 2 h, more than 5 H
     assert scaled.layers.unrestricted == pytest.approx(2e-3)
     assert scaled.solver.barrier_distance == pytest.approx(0.15e-3)
     assert scaled.inside_tolerance(1.0) == pytest.approx(5e-6)

@@ -111,3 +111,12 @@ def test_misuse_is_refused() -> None:
     for wrong in (-0.1, 80.1, np.nan):
         with pytest.raises(ValueError, match="arc lengths"):
             StitchingMap(80.0, 40.0, 3.0).annulus_arc_length([wrong])
+
+
+def test_inverse() -> None:
+    """Truth: gamma of gamma^-1 is the identity; both ends stay."""
+    stitching = StitchingMap(40.0, 25.0, 3.0)
+    line = np.linspace(0.0, 25.0, 101)
+    back = stitching.template_arc_length(line)
+    np.testing.assert_allclose(stitching.annulus_arc_length(back), line, atol=1e-12)
+    np.testing.assert_array_equal(back[[0, -1]], [0.0, 40.0])

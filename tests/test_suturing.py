@@ -183,11 +183,11 @@ def test_clamp(done: Done) -> None:
 
 def test_clearances(done: Done) -> None:
     """Truth: by the distances' formulas, no free node misses its clearance by more than the scene
-    allows: H/2 from the wedge (lambda = 1) and from the wall; within the taper of 5 H just the
+    allows: H/2 from the wedge (lambda = 1) and from the wall; within the taper just the
     wall itself."""
     setup, points = done.setup, done.result.points
     free = np.setdiff1d(np.arange(len(points)), setup.mesh.suture_line)
-    near = setup.mesh.distance_to_suture[free] < 2.5
+    near = setup.mesh.distance_to_suture[free] < setup.scene.wall_taper(0.5)
     wall = 12.0 - np.hypot(*points[free, :2].T) - np.where(near, 0.0, 0.25)
     wedge = setup.wedges.wedge(1, 1.0).evaluate(points[free])[0] - 0.25
     assert wall.min() >= -0.3
@@ -435,3 +435,49 @@ def test_going_on_from_a_refined_mesh(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.result.points, whole.result.points, rtol=0, atol=1e-9)
     shapes = {shot.points.shape for shot in again.result.snapshots}
     assert shapes == {whole.result.points.shape}
+
+
+def test_clearance_between_nodes(done: Done) -> None:
+    """Truth: by brute force on the result, the surface next to the stitch keeps the clearance from
+    the wedge to 0.8 of the tolerance; nodes ask for no less than the surface must keep."""
+    setup, points = done.suturing.setup, done.result.points
+    assert (setup.wedge.clearance >= setup.wedge_clearance).all()
+    held = np.zeros(len(points), dtype=bool)
+    held[setup.mesh.suture_line] = held[setup.row.nodes] = True
+    edges = setup.mesh.edges[held[setup.mesh.edges].sum(axis=1) == 1]
+    allowed = 0.8 * setup.scene.inside_tolerance(setup.cusp.thickness)
+    wedge = setup.wedges.wedge(1, 1.0)
+    for share in np.linspace(0.2, 0.8, 13):
+        place = (1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]]
+        ends = setup.wedge_clearance[edges]
+        wanted = (1 - share) * ends[:, 0] + share * ends[:, 1]
+        assert (wedge.signed_distance(place) >= wanted - 1.1 * allowed).all()
+
+
+def test_far_edges_are_turned_gently(tmp_path: Path) -> None:
+    """Truth: when a clamped triangle is turned over, the clamp begins 4^-steps softer, and is as
+    stiff as before once all edges are turned; a triangle near its half-plane changes nothing."""
+    run = Done(set_up(), tmp_path).suturing
+    setup = run.setup
+    stiffness = 1e4
+    setup.clamp.stiffness = stiffness
+    points = setup.start.copy()
+    points[setup.mesh.suture_line] = setup.target
+    ends = (setup.target[1:] + setup.target[:-1]) / 2
+    points[setup.clamp.apex] = ends - 0.5 * setup.conormal
+    run._ease_clamp(points)
+    assert setup.clamp.stiffness == stiffness
+    middle = len(ends) // 2
+    points[setup.clamp.apex[middle]] = ends[middle] + 0.5 * setup.conormal[middle]
+    run._ease_clamp(points)
+    assert setup.clamp.stiffness * 4.0**setup.scene.solver.clamp_steps == stiffness
+    used = []
+
+    def settle(_before: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, str]:
+        used.append(setup.clamp.stiffness)
+        return state, ""
+
+    run._settle = settle  # type: ignore[method-assign]
+    run._clamp_again(run._begin())
+    np.testing.assert_allclose(np.diff(np.log(used)), np.log(4.0))
+    assert used[-1] == stiffness

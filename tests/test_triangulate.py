@@ -193,3 +193,17 @@ def test_small_template_at_a_small_size() -> None:
     assert mesh.area == pytest.approx(large.area / 64, rel=1e-12)
     assert len(mesh.suture_line) == len(large.suture_line)
     assert angles(mesh).min() > 15.0
+
+
+def test_nodes_where_they_are_wanted() -> None:
+    """Truth: joints are nodes of the suture line, at their arc lengths exactly, and every piece
+    between joints is divided evenly; a joint closer than h/2 to another break is left out."""
+    outline = CuspTemplate(Template())
+    length = float(outline.suture_line.breaks[-1])
+    joints = np.array([2.5, length - 2.5])
+    mesh = triangulate_template(outline, 1.4, joints)
+    assert np.isin(joints, mesh.suture_arc_length).all()
+    first = np.diff(mesh.suture_arc_length[mesh.suture_arc_length <= 2.5])
+    np.testing.assert_allclose(first, 1.25)
+    near = triangulate_template(outline, 1.4, np.array([0.6, length - 0.6]))
+    assert digest(near) == digest(triangulate_template(outline, 1.4))
