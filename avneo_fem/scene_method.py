@@ -149,7 +149,9 @@ class Solver(Table):
         3, description="iterations a level of quality approximate, on refined meshes"
     )
     tolerance: Positive = Field(
-        1e-8, description="final residual relative to the pressure load P x area"
+        1e-8,
+        description="final residual relative to the load: P x area, or, where that is more,"
+        " 0.05 E H sqrt(area)",
     )
     path_tolerance: Positive = Field(
         1e-2,

@@ -140,12 +140,12 @@ def test_fixed_and_free() -> None:
 
 
 def test_relative_residual() -> None:
-    """Truth: norm of the residual's free entries over P x area; terms count."""
+    """Truth: norm of the residual's free entries over the load; terms count."""
     system, _ = system_with_terms(True)
     state = rough(system.model, 3)
     system.fix(system.model.position_dofs[system.model.mesh.suture_line])
     expected = np.linalg.norm(np.delete(system.residual(state), np.flatnonzero(system.fixed)))
-    expected /= 8.0 * system.model.mesh.area
+    expected /= system.model.load_scale()
     assert system.relative_residual(state) == pytest.approx(expected)
     system.terms.clear()
     assert system.relative_residual(state) != pytest.approx(expected)

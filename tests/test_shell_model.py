@@ -156,12 +156,12 @@ def test_directors_start_upright_and_are_copied() -> None:
 
 
 def test_load_scale() -> None:
-    """Truth: P x area of the template; without pressure 0.005 E H sqrt(area)."""
+    """Truth: P x area of the template; without pressure 0.05 E H sqrt(area)."""
     mesh = strip(4, 3, 2.0, 1.0)
-    assert shell(mesh, bending=False, pressure=5.0).load_scale() == pytest.approx(10.0)
+    assert shell(mesh, bending=False, pressure=50.0).load_scale() == pytest.approx(100.0)
     model = shell(mesh, bending=False, pressure=0.0)
     given = model.parameters
-    expected = 0.005 * given.young_modulus * given.thickness * np.sqrt(2.0)
+    expected = 0.05 * given.young_modulus * given.thickness * np.sqrt(2.0)
     assert model.load_scale() == pytest.approx(expected)
 
 

@@ -28,7 +28,7 @@ Ints = NDArray[np.int64]
 
 _FREE_EDGE = 1
 #: strain whose membrane force stands for the load where there is little pressure
-_LOADING_STRAIN = 0.005
+_LOADING_STRAIN = 0.05
 
 #: Entries of the one constant vector in the kernels
 _CONSTANTS: dict[str, int | slice] = {
@@ -295,7 +295,7 @@ class ShellModel:
     def load_scale(self) -> float:
         """Force that residuals are given relative to [mN].
 
-        P x area of the template, or, where that is less, the membrane force of a strain of 0.5 %
+        P x area of the template, or, where that is less, the membrane force of a strain of 5 %
         across it: without much pressure, gathering is what loads a cusp.
         """
         given, area = self.parameters, self.mesh.area
