@@ -23,13 +23,17 @@ from avneo_fem.scene_tables import (
     Commissures,
     Competence,
     Cusp,
-    Positive,
+    NonNegative,
     Root,
     Stitching,
     Table,
 )
 
 __all__ = ["Scene"]
+
+
+#: strain that the pressure on the way causes at least
+_PATH_STRAIN = 0.1
 
 
 class Scene(Table):
@@ -45,7 +49,11 @@ class Scene(Table):
         "scene",
         description="names the output folder out/NAME; a file without it is named after itself",
     )
-    diastolic_pressure: Positive = Field(8.0, description="P [kPa]")
+    diastolic_pressure: NonNegative = Field(
+        8.0,
+        description="P [kPa]; where that hardly strains the cusp, 0.1 E H / R acts on the way and"
+        " is let down to P at its end",
+    )
     root: Root = Field(default_factory=Root)
     commissures: Commissures = Field(default_factory=Commissures)
     cusp: tuple[Cusp, Cusp, Cusp] = Field(default_factory=lambda: (Cusp(), Cusp(), Cusp()))
@@ -84,6 +92,15 @@ class Scene(Table):
         if chosen is not None:
             return chosen
         return max(0, int(np.floor(np.log2(self.root.radius / 4 / self.mesh_size))))
+
+    def path_pressure(self, thickness: float) -> float:
+        """Pressure on a cusp of this thickness until its first row is in place [kPa].
+
+        P, but at least 0.1 E H / R, which strains the cusp by about 10 %: with less, nothing
+        unfolds a cusp whose edge turns.
+        """
+        least = _PATH_STRAIN * self.material.young_modulus * thickness / self.root.radius
+        return max(self.diastolic_pressure, least)
 
     def wall_taper(self, thickness: float) -> float:
         """Distance over which the clearance of a cusp of this thickness from the wall grows [mm].

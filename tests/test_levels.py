@@ -91,3 +91,12 @@ def test_levels_of_equal_input_are_equal() -> None:
     """Truth: levels are values; a checkpoint that counts them means the same in the next run."""
     assert levels_of(scene(), 3, LAMBDAS, FINER) == levels_of(scene(), 3, LAMBDAS, FINER)
     assert Level("boundary", 0.0, 0.1) != Level("boundary", 0.0, 0.1, 1)
+
+
+def test_unloading() -> None:
+    """Truth: where the way needs more pressure than P, it is let down on the last mesh, once all
+    nodes are in place."""
+    given = parse_scene({"diastolic_pressure": 0.0})
+    names = [level.name for level in levels_of(given, 0, (0.0, 1.0), unloads=True)]
+    assert names[-4:] == ["first_row", "first_row", "unloading", "unloading"]
+    assert "unloading" not in [level.name for level in levels_of(given, 0, (0.0, 1.0))]

@@ -481,3 +481,15 @@ def test_far_edges_are_turned_gently(tmp_path: Path) -> None:
     run._clamp_again(run._begin())
     np.testing.assert_allclose(np.diff(np.log(used)), np.log(4.0))
     assert used[-1] == stiffness
+
+
+def test_without_pressure(tmp_path: Path) -> None:
+    """Truth: with P = 0 the way is gone under 0.1 E H / R, and the end is in equilibrium without
+    any pressure: the residual has no pressure term."""
+    run = Done(set_up(diastolic_pressure=0.0), tmp_path).run()
+    setup = run.suturing.setup
+    assert setup.path_pressure == pytest.approx(0.1 * 1000.0 * 0.5 / 12.0)
+    assert run.result.failure is None
+    assert "unloading" in run.names
+    assert setup.model.pressure == 0.0
+    assert run.result.residual <= 1e-8

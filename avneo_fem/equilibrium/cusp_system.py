@@ -85,8 +85,8 @@ class CuspSystem:
         return float(np.linalg.norm(forces / self._arms[dofs]))
 
     def energy_scale(self) -> float:
-        """Energy that is lost in rounding [mN mm]: 2e-4 of the load times H."""
-        return 1e-4 * self.load_scale() * MOMENT_ARM * self.model.parameters.thickness
+        """Energy whose rounding counts at least [mN mm]: the load's work on 1e-3 of the size."""
+        return float(1e-3 * self.load_scale() * np.sqrt(self.model.mesh.area))
 
     def _active(self, extra: Sequence[Term]) -> list[Term]:
         contact = [] if self.contact is None else [self.contact]

@@ -90,6 +90,8 @@ class CuspSetup:
         Where the sutured nodes go.
     conormal : (k-1, 3) array
         Prescribed outward conormal b of the suture edges.
+    path_pressure : float
+        Pressure until the first row is in place [kPa], P or more.
     wedge_clearance : (n,) array
         d_0 that the surface must keep from the contact wedge [mm]; ``wedge.clearance``, that of
         the nodes, may become more.
@@ -110,6 +112,7 @@ class CuspSetup:
         clock = time.perf_counter()
         self.model = ShellModel(mesh, self._parameters())
         self.compile_seconds = time.perf_counter() - clock
+        self.path_pressure = scene.path_pressure(self.cusp.thickness)
         self.target = self.cusp.sutured_position(mesh.suture_arc_length)
         middles = (mesh.suture_arc_length[1:] + mesh.suture_arc_length[:-1]) / 2
         self.conormal = self.cusp.sutured_conormal(middles)

@@ -12,6 +12,7 @@ __all__ = ["Level", "levels_of"]
 
 _BOUNDARY_LEVELS = 10
 _ROW_LEVELS = 2
+_UNLOADING_LEVELS = 2
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,11 @@ def _steps(name: str, count: int, mesh: int = 0) -> list[Level]:
 
 
 def levels_of(
-    scene: Scene, placement: int, lambdas: Sequence[float], finer: Sequence[CuspMesh] = ()
+    scene: Scene,
+    placement: int,
+    lambdas: Sequence[float],
+    finer: Sequence[CuspMesh] = (),
+    unloads: bool = False,
 ) -> list[Level]:
     """All levels up to the last mesh; the raising of penalties afterwards has as many as it needs.
 
@@ -52,6 +57,8 @@ def levels_of(
         How the contact wedge closes, from the level at which it appears (0) to 1.
     finer : sequence of CuspMesh
         Refinements of the first mesh.
+    unloads : bool
+        Whether the pressure on the way is more than P.
     """
     levels = [Level("placement", 0.0, float(placement))]
     levels += _steps("boundary", _BOUNDARY_LEVELS)
@@ -64,4 +71,6 @@ def levels_of(
     levels += [Level("refinement", 0.0, 1.0, number + 1) for number in range(len(finer))]
     if scene.material.bending:
         levels += _steps("first_row", _ROW_LEVELS, len(finer))
+    if unloads:
+        levels += _steps("unloading", _UNLOADING_LEVELS, len(finer))
     return levels

@@ -30,7 +30,7 @@ _FIRST_PRESSURE = 0.05
 _BOUNDARY_DAMPING, SETTLE_DAMPING = 1.5, 0.6
 _BOUNDARY_ITERATIONS = 6
 #: iterations after a part of the way to the line of a finer mesh
-_REST_ITERATIONS = 40
+_REST_ITERATIONS = 100
 #: angle from which on an edge is turned gently [rad]
 _FAR = np.radians(60.0)
 
@@ -107,7 +107,7 @@ class CuspMoves:
     def _move_boundary(self, state: Floats, start: float, stop: float) -> Outcome:
         """Move the sutured edge on its straight way; the inside follows harmonically."""
         model = self.setup.model
-        model.pressure = self.setup.scene.diastolic_pressure * max(_FIRST_PRESSURE, stop)
+        model.pressure = self.setup.path_pressure * max(_FIRST_PRESSURE, stop)
         return self._move(state, start, stop)
 
     def _move(self, state: Floats, start: float, stop: float) -> Outcome:
@@ -205,6 +205,16 @@ class CuspMoves:
         trial = state.copy()
         trial[setup.model.position_dofs] += move
         return self._settle(state, self._turned(trial, row.is_blocked, share))
+
+    def _unload(self, state: Floats, _start: float, stop: float) -> Outcome:
+        """Let the pressure down from that of the way to P."""
+        self.setup.model.pressure = self._pressure(stop)
+        return self._settle(state, state)
+
+    def _pressure(self, share: float) -> float:
+        """Pressure when that of the way is let down by a share of what it is above P [kPa]."""
+        above = self.setup.path_pressure - self.setup.scene.diastolic_pressure
+        return self.setup.path_pressure - share * above
 
     def _close_wedge(self, state: Floats, _start: float, stop: float) -> Outcome:
         self.setup.wedge.field = self.setup.wedge_field(max(stop, 0.0))

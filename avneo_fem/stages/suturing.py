@@ -6,7 +6,8 @@ itself. On a coarse mesh, ``boundary`` moves the sutured edge to its line in dam
 turns the edge into its tangent half-plane (step 4), and ``contact_wedge`` closes the wedge,
 lambda = 0 ... 1 (§3.4 step 2). Each ``refinement`` splits the triangles into four and goes on from
 the same surface, which is free of crossings, too. ``first_row`` lays down what has no room in its
-half-plane (``stages.blocked_edge``), ``root_wall`` raises the penalties of wall, wedge and clamp
+half-plane (``stages.blocked_edge``). Where P is too little to unfold a cusp on its way, more acts
+so far, and ``unloading`` lets it down. ``root_wall`` raises the penalties of wall, wedge and clamp
 until each holds (step 3) and layers keep their clearance, and ``equilibrium`` converges the
 result. One step of each is in ``stages.moves``, the end in ``stages.raising``.
 """
@@ -43,6 +44,7 @@ _ADVICE = {
     "hinged_edge": "raise solver.maximum_iterations, or refine mesh.size",
     "clamped_edge": "raise solver.clamp_steps, or refine mesh.size",
     "contact_wedge": "raise contact.steps, or refine mesh.size",
+    "unloading": "raise solver.maximum_iterations, or diastolic_pressure",
     "refinement": "choose other mesh.refinements (0 splits nothing), or another mesh.size",
     "first_row": "refine mesh.size, or raise solver.inside_tolerance",
 }
@@ -77,7 +79,8 @@ class CuspSuturing(PenaltyRaising):
         index: int | None = None,
     ) -> None:
         lambdas = setup.wedges.levels(setup.scene.contact.steps)
-        planned = levels_of(setup.scene, setup.placement_k, lambdas, finer)
+        unloads = setup.path_pressure > setup.scene.diastolic_pressure
+        planned = levels_of(setup.scene, setup.placement_k, lambdas, finer, unloads)
         levels = [level for level in planned if level.name not in self._left_out]
         name = setup.index if index is None else index
         super().__init__(setup, levels, observer, store, name)
@@ -197,8 +200,10 @@ class CuspSuturing(PenaltyRaising):
             setup.system.fix(setup.model.angle_dofs[self._suture_edges(held)])
             setup.system.fix(setup.model.position_dofs[setup.row.nodes])
             setup.clamp.active = held
-        if name not in ("placement", "boundary"):
-            setup.model.pressure = setup.scene.diastolic_pressure
+        if name == "unloading":
+            setup.model.pressure = self._pressure(parameter)
+        elif name not in ("placement", "boundary"):
+            setup.model.pressure = setup.path_pressure
 
     def _mesh_size(self, level: Level) -> float:
         return float(self.setup.scene.mesh_size * 2.0 ** (len(self.finer) - level.mesh))
@@ -216,6 +221,7 @@ class CuspSuturing(PenaltyRaising):
             "hinged_edge": (self._settle_hinged, 1.0, ""),
             "clamped_edge": (self._turn_edge, after - before, ""),
             "contact_wedge": (self._close_wedge, after - before, ""),
+            "unloading": (self._unload, after - before, ""),
             "refinement": (self._follow_mesh, 1.0, ""),
             "first_row": (self._lay_row, after - before, ""),
         }[name]
