@@ -135,7 +135,7 @@ def run(contact: str, solver: str, scene: Scene) -> Run:
         iterations, residual = sum(level.iterations for level in result.records), result.residual
     else:
         given = ValveInput.from_scene(changed(scene, mesh={"refinements": 0}))
-        mesh = mesh_templates(given)[scene.cusp[0].template][0]
+        mesh = mesh_templates(given)[0][0]
         cusp = suture_plainly(given, 0, mesh, damped=solver == DAMPED)
         points, triangles = cusp.points, mesh.triangles
         outcome = cusp.failure or ("converged" if cusp.converged else "no equilibrium found")

@@ -18,8 +18,8 @@ __all__ = ["CuspSystem"]
 
 Floats = NDArray[np.float64]
 
-#: arm at which moments on director angles count as forces, in units of the thickness H
-MOMENT_ARM = 2.0
+#: arm at which moments on director angles count as forces, in units of the template's size
+MOMENT_ARM = 0.1
 
 
 class CuspSystem:
@@ -49,7 +49,7 @@ class CuspSystem:
         self.force_scale: float | None = None
         self.fixed = np.zeros(model.size, dtype=bool)
         self._arms = np.ones(model.size)
-        self._arms[model.angle_dofs.ravel()] = MOMENT_ARM * model.parameters.thickness
+        self._arms[model.angle_dofs.ravel()] = MOMENT_ARM * np.sqrt(model.mesh.area)
         self._expand = self._expansion()
 
     def _expansion(self) -> sp.csr_matrix:
@@ -77,7 +77,8 @@ class CuspSystem:
         return self.model.load_scale() if self.force_scale is None else self.force_scale
 
     def magnitude(self, forces: Floats, dofs: NDArray[np.int64]) -> float:
-        """Norm of generalised forces on ``dofs`` [mN]: a moment counts as a force at an arm of 2 H.
+        """Norm of generalised forces on ``dofs`` [mN]: a moment counts as a force at an
+        arm of a tenth of sqrt(area).
 
         Forces and moments have no common unit: without an arm a convergence test would depend on
         the unit of length.
@@ -85,8 +86,10 @@ class CuspSystem:
         return float(np.linalg.norm(forces / self._arms[dofs]))
 
     def energy_scale(self) -> float:
-        """Energy whose rounding counts at least [mN mm]: the load's work on 1e-3 of the size."""
-        return float(1e-3 * self.load_scale() * np.sqrt(self.model.mesh.area))
+        """Energy whose rounding counts at least [mN mm]: the membrane's is a difference of terms of
+        the size of E H x area."""
+        given = self.model.parameters
+        return float(1e-3 * given.young_modulus * given.thickness * self.model.mesh.area)
 
     def _active(self, extra: Sequence[Term]) -> list[Term]:
         contact = [] if self.contact is None else [self.contact]

@@ -14,12 +14,12 @@ from scipy.spatial import cKDTree
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.meshing.cusp_mesh import CuspMesh
-from avneo_fem.meshing.refine import nested_meshes
 from avneo_fem.results.cusp_curves import TOUCHING, along, contact_curve, length
 from avneo_fem.results.fields import principal_stretches
 from avneo_fem.results.surface_distance import samples, surface_distance
 from avneo_fem.results.surfaces import read_stl
 from avneo_fem.scene import parse_scene
+from avneo_fem.valve.suture_valve import mesh_templates
 
 __all__ = ["CuspMeasures", "Errors", "compare_cusps", "measure_cusp", "measure_run", "worst"]
 
@@ -161,16 +161,13 @@ def measure_run(report: dict[str, Any], folder: Path) -> dict[int, CuspMeasures]
         When a surface is missing or does not belong to the report.
     """
     given = ValveInput.from_scene(parse_scene(report["scene"]))
-    scene = given.scene
+    meshes = mesh_templates(given)
     found = {}
     for cusp in report["cusps"]:
         index = int(cusp["index"])
         if cusp["copied_from"] is not None:
             continue
-        template = given.geometry.cusps[index].template
-        mesh = nested_meshes(
-            template, scene.mesh_size, scene.refinements, scene.mesh.refinements is None
-        )[-1]
+        mesh = meshes[index][-1]
         points = _nodes(folder / f"cusp_{index}.stl", mesh)
         found[index] = measure_cusp(given, index, mesh, points)
     return found
