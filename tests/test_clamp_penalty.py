@@ -226,3 +226,27 @@ def test_reference_is_all_there_is_to_keep() -> None:
     )
     penalty.reference = first
     assert penalty.energy(points) == before
+
+
+def test_no_triangle_turns_over_in_a_step() -> None:
+    """Truth: an apex that moves straight at its edge may go 0.9 of the way, however fast; one that
+    moves along the edge, away from it, or by less than that may go all of it; edges that do not
+    act do not count."""
+    edges = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
+    conormal = np.array([[0.0, -1.0, 0.0]])
+    penalty = ClampPenalty(3, np.array([2]), edges, conormal, np.ones(1), 1.0)
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.4, 0.1, 0.0]])
+    for move, share in (
+        ([0.0, -1.0, 0.0], 0.09),
+        ([5.0, -0.5, 0.0], 0.18),
+        ([0.0, -0.2, 3.0], 0.45),
+        ([0.0, -0.08, 0.0], 1.0),
+        ([1.0, 0.0, 1.0], 1.0),
+        ([0.0, 1.0, 0.0], 1.0),
+    ):
+        moves = np.zeros((3, 3))
+        moves[2] = move
+        assert penalty.largest_share(points, moves) == pytest.approx(share)
+    penalty.active[:] = False
+    moves[2] = [0.0, -1.0, 0.0]
+    assert penalty.largest_share(points, moves) == 1.0

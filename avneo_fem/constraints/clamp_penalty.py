@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 #: below this angle at renewal the apex's height over the half-plane stands for the angle [rad]
 _NEAR = np.radians(60.0)
+#: share of the way to a turn of 90 degrees that a step may go
+_TURN = 0.9
 
 
 class ClampPenalty:
@@ -101,6 +103,17 @@ class ClampPenalty:
         """Count further rotations, and measure heights, from the present state."""
         angle, square, _, _ = self._polar(points)
         self.reference = np.stack([angle, np.sqrt(square)])
+
+    def largest_share(self, points: Floats, moves: Floats) -> float:
+        """Share of ``moves`` (n, 3) after which no triangle has turned by 90 degrees, 0..1.
+
+        A flat triangle that is squeezed against its edge could otherwise pass through it within
+        one step and come out on the other side, turned by 180 degrees: nothing else notices.
+        """
+        _, square, radial, _ = self._polar(points)
+        towards = -np.einsum("kd,kd->k", radial, moves[self.apex])
+        blocking = self.active & (towards > _TURN * square)
+        return float((_TURN * square[blocking] / towards[blocking]).min(initial=1.0))
 
     @property
     def _near(self) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-__all__ = ["Foreseeing", "Foreseen", "Term", "block_diagonal"]
+__all__ = ["Foreseeing", "Foreseen", "Limiting", "Term", "block_diagonal"]
 
 Floats = NDArray[np.float64]
 
@@ -52,6 +52,14 @@ class Foreseeing(Protocol):
 
     def foreseen(self, points: Floats, moves: Floats) -> Foreseen:
         """Change at positions (n, 3) when ``moves`` (n, 3) are taken; linearised distances."""
+
+
+@runtime_checkable
+class Limiting(Protocol):
+    """A term whose meaning is lost when a step is too long."""
+
+    def largest_share(self, points: Floats, moves: Floats) -> float:
+        """Share of ``moves`` (n, 3) at positions (n, 3) that may be taken, 0..1."""
 
 
 def block_diagonal(blocks: Floats) -> sp.bsr_matrix:

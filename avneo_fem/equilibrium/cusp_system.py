@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from avneo_fem.constraints.self_contact import SelfContact
-from avneo_fem.constraints.term import Foreseeing, Foreseen, Term
+from avneo_fem.constraints.term import Foreseeing, Foreseen, Limiting, Term
 from avneo_fem.equilibrium.shell_model import ShellModel
 from avneo_fem.equilibrium.stopwatch import Stopwatch
 
@@ -90,6 +90,12 @@ class CuspSystem:
         the size of E H x area."""
         given = self.model.parameters
         return float(1e-3 * given.young_modulus * given.thickness * self.model.mesh.area)
+
+    def largest_share(self, state: Floats, moves: Floats) -> float:
+        """Share of ``moves`` (n, 3) that no term finds too far, 0..1."""
+        points = self.positions(state)
+        limits = [t.largest_share(points, moves) for t in self.terms if isinstance(t, Limiting)]
+        return min(limits, default=1.0)
 
     def _active(self, extra: Sequence[Term]) -> list[Term]:
         contact = [] if self.contact is None else [self.contact]

@@ -210,6 +210,7 @@ class NewtonSolver:
         moves = self.system.positions(step)
         longest = float(np.linalg.norm(moves, axis=1).max())
         share = min(1.0, self.settings.largest_move / max(longest, 1e-300))
+        share *= self.system.largest_share(self._base, share * moves)
         self._convex = self._convex and share == 1.0
         contact = self.system.contact
         if contact is not None:
