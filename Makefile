@@ -23,8 +23,8 @@ setup: ## Debian packages and .venv, only what is missing
 demo: setup ## Experiment 1 end to end, results in out/experiment-1/
 	.venv/bin/avneo suture demos/experiment_1.toml -o out/experiment-1
 
-test: setup ## the test suite (PYTEST_ARGS="-k scene" selects)
-	$(PYTHON) -m pytest $(PYTEST_ARGS)
+test: setup ## the test suite on two cores (PYTEST_ARGS="-k scene" selects)
+	$(PYTHON) -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
 
 test-slow: setup ## the tests that take longer than a few seconds each
 	$(PYTHON) -m pytest -m slow $(PYTEST_ARGS)

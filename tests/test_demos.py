@@ -57,7 +57,6 @@ def test_experiment_3(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="Experiment 2 is not verified yet (docs/experiments.md)")
 def test_experiment_2(tmp_path: Path) -> None:
     """Truth: Experiment 2 at twice the paper's h meets every figure of its page."""
     page(2, 1.4, tmp_path / "out", timeout=3600.0)
