@@ -47,7 +47,7 @@ def _material_cases() -> list[ExtremeCase]:
                 f"E = {e:g} kPa under the whole 8 kPa",
                 {**BASE, "material.young_modulus": e},
                 infeasible=_INFLATION.format(8.0 * 12.0 / (e * 0.5)),
-                diagnosis=r"residual|iteration limit|no step decreases|short of|clamp off",
+                diagnosis=r"residual|iteration limit|no step decreases|short of|clamp|cusps cross",
             )
         )
     for pressure in (0.0, 0.01, 1.0, 16.0, 40.0):
@@ -144,9 +144,6 @@ def _thickness_cases() -> list[ExtremeCase]:
             "2\nL_f 1.9 a",
             "the large cusps of Experiment 1 from a sheet of 2 mm, gap = H",
             {**BASE, **of_thickness(2.0), "commissures.gap": 2.0},
-            infeasible="three cusps of about 900 mm^2 and 2 mm have nearly the volume of the root"
-            " above the bottom of the suture lines, 5650 mm^3",
-            diagnosis=r"short of|layers|collide|residual|clamp|iteration",
         )
     )
     return cases
