@@ -30,7 +30,7 @@ BAD: dict[str, tuple[str, str, str]] = {
     ),
     "unknown table": ("[stich]\nx = 1", "stich = {'x': 1}", "did you mean 'stitching'"),
     "negative thickness": ("[template]\nthickness = -0.5", "template.thickness = -0.5", "> 0"),
-    "zero pressure": ("diastolic_pressure = 0.0", "diastolic_pressure = 0.0", "> 0"),
+    "suction": ("diastolic_pressure = -1.0", "diastolic_pressure = -1.0", ">= 0"),
     "radius of the paper": (
         "[template]\nbelly_radius = 33.0",
         "template.belly_radius = 33.0",

@@ -17,6 +17,7 @@ import pytest
 
 from avneo_fem import compat
 from avneo_fem.compat import fem, ufl
+from run_cases import environment
 from shell_cases import disc
 
 CHILD = """
@@ -204,15 +205,9 @@ def test_an_error_on_one_rank_ends_all() -> None:
         "if MPI.COMM_WORLD.rank == 1: raise ValueError('rank one is out')\n"
         "MPI.COMM_WORLD.recv(source=1)\n"
     )
-    environment = dict(os.environ) | {
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-        "OMPI_MCA_rmaps_base_oversubscribe": "1",
-        "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    }
     done = subprocess.run(
         ["mpirun", "-n", "2", sys.executable, "-c", code],
-        env=environment,
+        env=environment(),
         capture_output=True,
         text=True,
         timeout=60,

@@ -289,7 +289,7 @@ def test_map_resumes(tmp_path: Path) -> None:
             raise KeyboardInterrupt
         return run_case(case, folder, reference, limit)
 
-    refused = ExtremeCase("a", "g", "a", "no pressure", {"diastolic_pressure": 0.0}, "no", "> 0")
+    refused = ExtremeCase("a", "g", "a", "suction", {"diastolic_pressure": -1.0}, "no", ">= 0")
     other = replace(refused, name="b", same_as="a")
     with pytest.raises(KeyboardInterrupt):
         run_map([refused, other], tmp_path, quiet(), run=run)
@@ -297,7 +297,7 @@ def test_map_resumes(tmp_path: Path) -> None:
     assert [name for name, *_ in ran] == ["a", "b", "b"]
     assert ran[-1] == ("b", "a", 300.0)
     assert [judged(*pair) for pair in ended] == [Judgement.RIGHT] * 2
-    changed = replace(refused, entries={"diastolic_pressure": -1.0})
+    changed = replace(refused, entries={"diastolic_pressure": -2.0})
     assert kept_outcome(refused, tmp_path / "a") == ended[0][1]
     assert kept_outcome(changed, tmp_path / "a") is None
     assert {"extremes.csv", "extremes.png"} <= {item.name for item in tmp_path.iterdir()}
