@@ -17,7 +17,6 @@ from avneo_fem.extremes.shaping import (
     in_other_units,
     of_thickness,
     proportioned,
-    taper_of,
 )
 
 __all__ = ["all_cases", "selected"]
@@ -102,7 +101,7 @@ def _thickness_cases() -> list[ExtremeCase]:
                 f"{h:g}",
                 f"H = {h:g} mm at h = {size:g} mm, whose chords cut into curved surfaces by less"
                 " than H; clearance from the wall grows over 2 h",
-                {**BASE, **of_thickness(h), **taper_of(h, size), "mesh.size": size},
+                {**BASE, **of_thickness(h), "mesh.size": size},
                 is_long=is_long,
                 patience=2.0 if not is_long else 6.0,
             )
@@ -154,18 +153,15 @@ def _mesh_cases() -> list[ExtremeCase]:
     cases = []
     for size in (3.0, 2.5, 2.0):
         allowed = min(_chord_cut(size), 0.25)
-        wide = size > 2.0
         cases.append(
             ExtremeCase(
                 f"mesh-{size:g}",
                 "h",
                 f"{size:g}",
                 f"h = {size:g} mm; clearances may be missed by {allowed:.3f} mm, what a"
-                " chord of that length cuts into a radius of 3 mm, or H/2"
-                + ("; clearance from the wall grows over 2 h" if wide else ""),
+                " chord of that length cuts into a radius of 3 mm, or H/2",
                 {
                     **BASE,
-                    **(taper_of(0.5, size) if wide else {}),
                     "mesh.size": size,
                     "solver.inside_tolerance": allowed,
                 },

@@ -25,7 +25,6 @@ __all__ = [
     "root_of",
     "scene_of_entries",
     "suture_line_lengths",
-    "taper_of",
 ]
 
 #: By how much clearances may be missed, in units of H. A triangle of h = 1.5 mm cuts h^2/8r = 0.1
@@ -96,15 +95,6 @@ def chords_by_angles(*degrees: float) -> list[float]:
 def of_thickness(thickness: float) -> dict[str, Any]:
     """H [mm], and clearances that may be missed by as much of it as in the base."""
     return {"template.thickness": thickness, "solver.inside_tolerance": _SHORT * thickness}
-
-
-def taper_of(thickness: float, size: float) -> dict[str, Any]:
-    """Distance over which the clearance from the wall grows: 5 H, the default, or 2 h.
-
-    The first row of triangles, about h wide, lies along the wall, as the clamp asks. Where 5 H is
-    less than its width it would have to keep H/2 from the wall as well.
-    """
-    return {"wall.taper": max(5.0 * thickness, 2.0 * size)}
 
 
 def root_of(radius: float) -> dict[str, Any]:

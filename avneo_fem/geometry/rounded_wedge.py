@@ -11,7 +11,8 @@ the same as before, and its force a linear spring towards that corner.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +49,11 @@ class RoundedWedge:
 
     section: PlanarWedge
     radius: float
-    corners: list[tuple[Array, tuple[float, float]]] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "corners", self._corners() if self.radius > 0.0 else [])
+    @cached_property
+    def corners(self) -> list[tuple[Array, tuple[float, float]]]:
+        """See above; sought when first asked for, as many a wedge on the way never is."""
+        return self._corners() if self.radius > 0.0 else []
 
     def _offset(self, place: Array) -> Array:
         """Points (n, 2) at the radius from places (n,), straight into the wedge."""
@@ -113,7 +115,7 @@ class RoundedWedge:
         """
         distance, gradient, bending = self.section.signed_distance(points)
         near = np.flatnonzero(distance < self.radius)
-        if not self.corners or not near.size:
+        if not near.size or not self.corners:
             return distance, gradient, bending
         place = self._place(points[near])
         for centre, (first, last) in self.corners:

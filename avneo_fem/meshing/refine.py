@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,6 @@ from avneo_fem.meshing.triangulate import TemplateOutline, triangulate_template
 __all__ = ["nested_meshes", "prolong", "refine"]
 
 Floats = NDArray[np.float64]
-
-_NOWHERE: Floats = np.empty(0)
 
 
 def refine(mesh: CuspMesh, template: TemplateOutline) -> CuspMesh:
@@ -51,7 +50,7 @@ def nested_meshes(
     size: float,
     refinements: int,
     fewer_will_do: bool = True,
-    joints: Floats = _NOWHERE,
+    joints: Sequence[float] | Floats = (),
 ) -> list[CuspMesh]:
     """Meshes of a template, each a refinement of the one before, the last of edge length ``size``.
 

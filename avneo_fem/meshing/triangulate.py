@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Protocol
 
@@ -16,7 +17,6 @@ __all__ = ["TemplateOutline", "triangulate_template"]
 
 Floats = NDArray[np.float64]
 
-_NOWHERE: Floats = np.empty(0)
 #: to what the outline is rounded, in units of the edge length
 _GRID = 2.0**-30
 
@@ -45,7 +45,7 @@ def _divide(breaks: Floats, size: float) -> Floats:
     return np.r_[np.concatenate(parts), breaks[-1]]
 
 
-def _with_joints(breaks: Floats, joints: Floats, size: float) -> Floats:
+def _with_joints(breaks: Floats, joints: Sequence[float] | Floats, size: float) -> Floats:
     """Breaks and those joints that leave no piece shorter than half of ``size``."""
     for joint in joints:
         if np.abs(breaks - joint).min() >= size / 2:
@@ -54,7 +54,7 @@ def _with_joints(breaks: Floats, joints: Floats, size: float) -> Floats:
 
 
 def triangulate_template(
-    template: TemplateOutline, size: float, joints: Floats = _NOWHERE
+    template: TemplateOutline, size: float, joints: Sequence[float] | Floats = ()
 ) -> CuspMesh:
     """Mesh a template with target edge length ``size`` [mm].
 
