@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-__all__ = ["FIDELITIES", "Fidelity", "with_bundle"]
+__all__ = ["FIDELITIES", "Fidelity", "with_bundle", "with_defaults"]
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,22 @@ def with_bundle(data: dict[str, Any]) -> dict[str, Any]:
     """
     name = data.get("fidelity", "standard")
     bundle = FIDELITIES.get(name) if isinstance(name, str) else None
+    return with_defaults(data, bundle.entries) if bundle else dict(data)
+
+
+def with_defaults(
+    data: dict[str, Any], defaults: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """What is given of a scene, and other defaults than the schema's beneath it.
+
+    Parameters
+    ----------
+    data : dict
+        As for :func:`with_bundle`.
+    defaults : mapping of table to mapping of key to value
+    """
     completed = dict(data)
-    for table, entries in bundle.entries.items() if bundle else ():
+    for table, entries in defaults.items():
         given = data.get(table, {})
         if isinstance(given, dict):
             completed[table] = {**entries, **given}

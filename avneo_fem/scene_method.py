@@ -36,7 +36,11 @@ class Material(Table):
     model: Literal["neo_hookean", "st_venant_kirchhoff"] = Field(
         "neo_hookean", description="membrane energy; the paper's is st_venant_kirchhoff (1.3)"
     )
-    young_modulus: Positive = Field(1000.0, description="E [kPa]")
+    young_modulus: Positive = Field(
+        1000.0,
+        description="E [kPa]; stiffnesses of free edge, contact, wall, clamp and layers that are"
+        " not stated are their defaults times E / 1000 kPa",
+    )
     bending: bool = Field(True, description="Kirchhoff-Love bending (c^b of (1.7))")
 
 

@@ -19,6 +19,7 @@ from avneo_fem.scene_method import (
     Solver,
     Wall,
 )
+from avneo_fem.scene_stiffness import with_stiffnesses
 from avneo_fem.scene_tables import (
     Commissures,
     Competence,
@@ -41,7 +42,8 @@ class Scene(Table):
 
     ``template`` and ``suture_line`` hold for all three cusps; ``cusp``, when given, lists three
     tables that override single entries of them. Entries that are not given take the default of
-    ``fidelity`` (:mod:`avneo_fem.scene_fidelity`), so a dumped scene states what was used and
+    ``fidelity`` (:mod:`avneo_fem.scene_fidelity`), stiffnesses of penalties in proportion to E
+    (:mod:`avneo_fem.scene_stiffness`), so a dumped scene states what was used and
     parses to itself; ``mesh.size`` stays as written, and :attr:`mesh_size` is what it comes to.
     """
 
@@ -77,8 +79,8 @@ class Scene(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _defaults_of_fidelity(cls, data: Any) -> Any:
-        return with_bundle(data) if isinstance(data, dict) else data
+    def _defaults_that_follow(cls, data: Any) -> Any:
+        return with_stiffnesses(with_bundle(data)) if isinstance(data, dict) else data
 
     @property
     def mesh_size(self) -> float:
