@@ -98,7 +98,8 @@ def _angle_cases() -> list[ExtremeCase]:
         ((70.0, 60.0, 50.0), 1.5, 0.6, 1.5),
         ((90.0, 45.0, 45.0), 1.5, 0.6, 1.5),
         ((75.0, 75.0, 30.0), 1.5, 0.6, 1.3),
-        ((110.0, 35.0, 35.0), 1.5, 0.7, 1.3),
+        ((110.0, 35.0, 35.0), 1.3, 0.7, 1.3),
+        ((120.0, 30.0, 30.0), 1.1, 0.8, 1.0),
         ((82.5, 82.5, 15.0), 1.5, 0.7, 1.0),
     ):
         text = "-".join(f"{angle:g}" for angle in angles)
@@ -115,6 +116,18 @@ def _angle_cases() -> list[ExtremeCase]:
                 patience=2.0,
             )
         )
+    large = (110.0, 35.0, 35.0)
+    cases.append(
+        ExtremeCase(
+            "angles-110-35-35-large",
+            "angles",
+            "110 35 35\nL_f 1.5 a",
+            "commissure triangle of 110-35-35 degrees, cusps of 1.5 chords",
+            proportioned(_with_depths(dict(BASE), large), 1.5, 0.7),
+            infeasible="the contact surface of a narrow cusp passes behind its own suture line",
+            diagnosis=r"the contact surface of cusp \d passes behind its suture line",
+        )
+    )
     for angles, alpha in (((120.0, 30.0, 30.0), 1.3), ((150.0, 15.0, 15.0), 1.5)):
         text = "-".join(f"{angle:g}" for angle in angles)
         shape = _with_depths({**BASE, "mesh.size": 1.0}, angles)
@@ -122,9 +135,9 @@ def _angle_cases() -> list[ExtremeCase]:
         about = f"commissure triangle of {text} degrees"
         cases += [
             ExtremeCase(
-                f"angles-{text}",
+                f"angles-{text}-large",
                 "angles",
-                text.replace("-", " "),
+                text.replace("-", " ") + f"\nL_f {alpha:g} a",
                 about,
                 entries,
                 infeasible="the curved contact surfaces of the two narrow cusps cross",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.suture_room import require_suture_room
 from avneo_fem.geometry.symmetry import require_symmetry
 from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.scene import Scene
@@ -37,8 +38,8 @@ class ValveInput:
         ------
         SceneError
             When the scene is geometrically impossible, which includes a contact wedge whose two
-            curves cross at one of the run's lambda, and symmetry planes of a valve without
-            symmetry.
+            curves cross at one of the run's lambda or that leaves out its own suture line, and
+            symmetry planes of a valve without symmetry.
         """
         geometry = ValveGeometry.from_scene(scene)
         require_symmetry(scene, geometry.commissures)
@@ -52,6 +53,7 @@ class ValveInput:
         for index in range(3):
             for lam in wedges.levels(scene.contact.steps):
                 wedges.wedge(index, lam)
+        require_suture_room(scene, geometry, wedges)
         return cls(scene, geometry, wedges)
 
     def seen_from(self, index: int) -> ValveInput:
