@@ -235,3 +235,16 @@ def test_nested_meshes_of_a_small_template() -> None:
     for fewer_will_do in (True, False):
         with pytest.raises(SceneError, match="too large"):
             nested_meshes(template, 40.0, 2, fewer_will_do)
+
+
+@pytest.mark.parametrize("refinements", [0, 1])
+def test_room_for_a_first_row_next_to_the_free_edge(refinements: int) -> None:
+    """Truth: also on the coarsest mesh the straight part of the suture line has an inner node;
+    refined meshes have one by being split."""
+    outline = polygon()
+    joints = np.array([2.0, outline.suture_line.length - 2.0])
+    first = nested_meshes(outline, 3.0 / 2**refinements, refinements, joints=joints)[-1]
+    between = first.suture_arc_length[(first.suture_arc_length > 0)]
+    assert between[0] == pytest.approx(1.0)
+    assert first.suture_arc_length[-1] - first.suture_arc_length[-2] == pytest.approx(1.0)
+    assert np.isin(joints, first.suture_arc_length).all()

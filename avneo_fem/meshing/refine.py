@@ -63,7 +63,9 @@ def nested_meshes(
         When the first mesh is too coarse for the template.
     """
     try:
-        meshes = [triangulate_template(template, size * 2.0**refinements, joints)]
+        # one edge from the free edge to the first bend would leave no room for a first row
+        at_ends = 2 if refinements == 0 and len(joints) else 1
+        meshes = [triangulate_template(template, size * 2.0**refinements, joints, at_ends)]
     except SceneError as error:
         if refinements == 0:
             raise

@@ -36,11 +36,17 @@ class TemplateOutline(Protocol):
     def free_edge(self) -> _Path: ...
 
 
-def _divide(breaks: Floats, size: float) -> Floats:
-    """Arc lengths that divide every smooth piece evenly into lengths close to ``size``."""
+def _divide(breaks: Floats, size: float, at_ends: int = 1) -> Floats:
+    """Arc lengths that divide every smooth piece evenly into lengths close to ``size``.
+
+    The first and the last piece are divided into ``at_ends`` at least.
+    """
+    pieces = list(pairwise(breaks))
+    least = np.ones(len(pieces), dtype=int)
+    least[[0, -1]] = at_ends
     parts = [
-        np.linspace(start, stop, max(1, round((stop - start) / size)) + 1)[:-1]
-        for start, stop in pairwise(breaks)
+        np.linspace(start, stop, max(fewest, round((stop - start) / size)) + 1)[:-1]
+        for fewest, (start, stop) in zip(least, pieces, strict=True)
     ]
     return np.r_[np.concatenate(parts), breaks[-1]]
 
@@ -54,7 +60,10 @@ def _with_joints(breaks: Floats, joints: Sequence[float] | Floats, size: float) 
 
 
 def triangulate_template(
-    template: TemplateOutline, size: float, joints: Sequence[float] | Floats = ()
+    template: TemplateOutline,
+    size: float,
+    joints: Sequence[float] | Floats = (),
+    at_ends: int = 1,
 ) -> CuspMesh:
     """Mesh a template with target edge length ``size`` [mm].
 
@@ -65,6 +74,8 @@ def triangulate_template(
     joints : (j,) array
         Arc lengths on its suture line [mm] where a node is wanted; one that would make an edge
         shorter than half of ``size`` is left out.
+    at_ends : int
+        Edges at least of the first and of the last piece of the suture line, up to the first joint.
 
     Notes
     -----
@@ -77,7 +88,7 @@ def triangulate_template(
         When ``mesh.size`` is too large for the template (fewer than 6 pieces of suture line).
     """
     breaks = _with_joints(np.asarray(template.suture_line.breaks), joints, size)
-    suture = _divide(breaks, size)
+    suture = _divide(breaks, size, at_ends)
     free = _divide(np.asarray(template.free_edge.breaks), size)
     if len(suture) < 7:
         largest = float(template.suture_line.breaks[-1]) / 8
