@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from avneo_fem.constraints.signed_distance_penalty import SignedDistance
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 
-__all__ = ["LaidRow", "blocked_row"]
+__all__ = ["LaidRow", "blocked_row", "may_be_missed"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -79,6 +79,15 @@ class LaidRow:
         return self.foot + cosine * self.inward + sine * self.normal + rest * self.tangent
 
 
+def may_be_missed(clearance: Floats, most: float) -> Floats:
+    """By how much clearances (n,) may be missed [mm]: ``most``, but half of them at most.
+
+    Neighbours whose edges are sewn on next to each other would cross otherwise. A tenth of
+    ``most`` is left where there is no clearance.
+    """
+    return np.clip(clearance / 2.0, 0.1 * most, most)
+
+
 def blocked_row(
     mesh: CuspMesh,
     apex: Ints,
@@ -106,7 +115,7 @@ def blocked_row(
     clearance : (n,) array
         d_0 of every node from it [mm].
     slack : float
-        By how much d_0 may be missed [mm].
+        By how much d_0 may be missed [mm], see :func:`may_be_missed`.
     upward : (3,) array
         n, normal of the plane of commissures, in which (1.6) measures the free edge's height.
     """
@@ -129,8 +138,9 @@ def blocked_row(
     reach = np.linspace(0.0, 1.0, _SAMPLES + 1)[1:] * height[:, None]
     samples = foot[:, None] + reach[..., None] * inward[:, None]
     distance = wedge.evaluate(samples.reshape(-1, 3))[0].reshape(reach.shape)
-    clear = np.logical_and.accumulate(distance >= clearance[apex][:, None] - slack, axis=1)
-    room = np.maximum(clear.sum(axis=1) / _SAMPLES * height, slack)
+    missing = may_be_missed(np.minimum(clearance[apex], wedge.evaluate(foot)[0]), slack)
+    clear = np.logical_and.accumulate(distance >= (clearance[apex] - missing)[:, None], axis=1)
+    room = np.maximum(clear.sum(axis=1) / _SAMPLES * height, missing)
     blocked = (room < _ROOM * height) & ~np.isin(apex, mesh.suture_line)
     length = np.linalg.norm(along, axis=1)
     # a node that has to stay at the free edge cannot go near the next bend

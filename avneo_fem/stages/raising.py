@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avneo_fem.constraints.between_nodes import shortfall_between
+from avneo_fem.stages.blocked_edge import may_be_missed
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.moves import SETTLE_DAMPING
 from avneo_fem.stages.progress import CuspProgress
@@ -56,6 +57,11 @@ class PenaltyRaising(CuspProgress):
 
     _kept_off = 0
 
+    @property
+    def _inside(self) -> float:
+        """By how much nodes may miss clearances [mm]: the judge also looks between them."""
+        return 0.5 * self.setup.scene.inside_tolerance(self.setup.cusp.thickness)
+
     def outside(self, points: Floats) -> tuple[float, float]:
         """Largest depth of a node outside the root and outside the contact wedge [mm]."""
         wall, wedge = self.setup.wall.evaluate(points)[0], self.setup.wedge.evaluate(points)[0]
@@ -68,16 +74,19 @@ class PenaltyRaising(CuspProgress):
         -------
         (wall, wedge, clamp, layers)
             Largest miss of the clearances [mm], sutured and laid nodes apart; within the taper a
-            node need only be inside the root. Clamp: rms angle to the half-plane [degrees].
+            node need only be inside the root, and where there is little clearance from the wedge
+            a miss weighs more. Clamp: rms angle to the half-plane [degrees].
         """
         setup = self.setup
+        inside = self._inside
         free = np.ones(len(points), dtype=bool)
         free[setup.mesh.suture_line] = False
         free[setup.row.nodes] = False
         distance = setup.wall.evaluate(points)[0]
         tapered = setup.wall.clearance < setup.wall.clearance.max()
         wall = np.where(tapered, -distance, setup.wall.clearance - distance)
-        wedge = setup.wedge.shortfall(points)
+        weight = inside / may_be_missed(setup.wedge.clearance, inside)
+        wedge = weight * setup.wedge.shortfall(points)
         clamp = setup.clamp.rms_angle(points) if setup.scene.material.bending else 0.0
         return (
             float(wall[free].max(initial=0.0)),
@@ -87,17 +96,24 @@ class PenaltyRaising(CuspProgress):
         )
 
     def _bulging(self, points: Floats) -> Floats:
-        """(n,) by how much edges from a node to the stitch miss the clearance from the wedge.
+        """(n,) by how much edges from these nodes miss the clearance from the wedge, where that
+        is too much.
 
         Next to the commissures neighbouring cusps lie at their clearance on both sides of the
-        wedge, and one end of these edges cannot give way. Elsewhere a flat triangle that cuts a
-        bend of the wedge has room on the other side of it.
+        wedge, and one end of the edges to the stitch cannot give way: as much as is judged.
+        Elsewhere a flat triangle that cuts a bend of the wedge has room on the other side of it,
+        unless triangles are large, or stretched: half of the clearance.
         """
         setup, edges = self.setup, self.setup.mesh.edges
         held = np.zeros(len(points), dtype=bool)
         held[setup.mesh.suture_line] = held[setup.row.nodes] = True
-        edges = edges[held[edges].sum(axis=1) == 1]
-        short = shortfall_between(setup.wedge.field, points, edges, setup.wedge_clearance)
+        edges = edges[~held[edges].all(axis=1)]
+        clearance = setup.wedge_clearance
+        short = shortfall_between(setup.wedge.field, points, edges, clearance)
+        judged = _BETWEEN * setup.scene.inside_tolerance(setup.cusp.thickness)
+        half = clearance[edges].mean(axis=1) / 2.0
+        allowed = np.where(held[edges].any(axis=1), np.minimum(judged, half), half)
+        short[short <= allowed] = 0.0
         result = np.zeros(len(points))
         for ends in edges.T:
             np.maximum.at(result, ends, short)
@@ -111,11 +127,9 @@ class PenaltyRaising(CuspProgress):
         setup = self.setup
         if self._kept_off == _ROUNDS:
             return False  # whether what is left matters, the verification says
-        allowed = _BETWEEN * setup.scene.inside_tolerance(setup.cusp.thickness)
-        more = self._bulging(points)
         before = setup.wedge.clearance
         most = setup.wedge_clearance + setup.scene.mesh_size / 2
-        after = np.minimum(np.where(more > allowed, before + more, before), most)
+        after = np.minimum(before + self._bulging(points), most)
         if np.array_equal(before, after):
             return False
         self._kept_off += 1
@@ -129,8 +143,7 @@ class PenaltyRaising(CuspProgress):
         if setup.layers.clearance > 0:
             # not before: coarse folds are sharper than the clearance
             setup.system.terms = [*setup.system.terms, setup.layers]
-        # less than what is judged: the judge also looks between the nodes
-        inside = 0.5 * scene.inside_tolerance(setup.cusp.thickness)
+        inside = self._inside
         allowed = (inside, inside, scene.clamp.tolerance_degrees, inside)
         limits = (
             scene.wall.maximum_stiffness,
