@@ -250,3 +250,14 @@ def test_no_triangle_turns_over_in_a_step() -> None:
     penalty.active[:] = False
     moves[2] = [0.0, -1.0, 0.0]
     assert penalty.largest_share(points, moves) == 1.0
+
+
+def test_full_turns_are_forgotten() -> None:
+    """Truth: an apex that went round its edge's line is where it was; from 225 degrees on the way
+    back is the short one, below that the way it came."""
+    penalty, arms = made(), np.array([1.3, 0.7])
+    for step in np.radians([60.0, 120.0, 180.0, 210.0]):
+        penalty.renew(turned(np.array([step, -step]), arms))
+    assert penalty.reference[0] == pytest.approx(np.radians([210.0, -210.0]))
+    penalty.renew(turned(np.radians([240.0, -300.0]), arms))
+    assert penalty.reference[0] == pytest.approx(np.radians([-120.0, 60.0]))

@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 #: below this angle at renewal the apex's height over the half-plane stands for the angle [rad]
 _NEAR = np.radians(60.0)
+#: a triangle that was turned by more has not been turned the whole way [rad]
+_OVER = np.radians(225.0)
 #: share of the way to a turn of 90 degrees that a step may go
 _TURN = 0.9
 
@@ -102,7 +104,17 @@ class ClampPenalty:
     def renew(self, points: Floats) -> None:
         """Count further rotations, and measure heights, from the present state."""
         angle, square, _, _ = self._polar(points)
-        self.reference = np.stack([angle, np.sqrt(square)])
+        self.reference = np.stack([self._unwound(angle), np.sqrt(square)])
+
+    @staticmethod
+    def _unwound(angle: Floats) -> Floats:
+        """Angles (k,) without full turns.
+
+        An apex that passes by beyond an end of its edge goes round the edge's line, and its angle
+        by 360 degrees, but the triangle has not turned round its edge: that is no way back. What
+        has been turned over, by little more than 180 degrees, has its way back.
+        """
+        return angle - 2 * np.pi * np.sign(angle) * (np.abs(angle) > _OVER)
 
     def largest_share(self, points: Floats, moves: Floats) -> float:
         """Share of ``moves`` (n, 3) after which no triangle has turned by 90 degrees, 0..1.
