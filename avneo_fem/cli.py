@@ -37,9 +37,11 @@ def check(scene: Scene, fidelity: Fidelity = None, set_: Set = None, json: Json 
     from avneo_fem.geometry.valve_input import ValveInput
     from avneo_fem.results.report import geometry_report, to_json
 
-    given = ValveInput.from_scene(load_scene(scene, fidelity, set_ or ()))
+    loaded = load_scene(scene, fidelity, set_ or ())
+    given = ValveInput.from_scene(loaded)
     geometry = geometry_report(given.geometry, given.wedges)
     show_geometry(_people, geometry)
+    _warn_of_inflation(loaded)
     if json:
         sys.stdout.write(to_json(geometry))
 
@@ -56,6 +58,14 @@ def size(scene: Scene, json: Json = False) -> None:
         sys.stdout.write(to_json(sizes))
     if not sizes["verified"]:
         raise typer.Exit(1)
+
+
+def _warn_of_inflation(loaded: Any) -> None:
+    from avneo_fem.results.inflation import inflation_warning
+
+    text = inflation_warning(loaded)
+    if text is not None:
+        _people.print(f"[yellow]{escape(text)}[/]")
 
 
 def _observer(rank: int) -> Any:
@@ -88,6 +98,7 @@ def suture(
     given = ValveInput.from_scene(loaded)
     if not given.geometry.competent:
         _people.print(f"[yellow]not competent:[/] {escape(given.geometry.competence_reason)}")
+    _warn_of_inflation(loaded)
     from avneo_fem.compat import MPI, install_abort_on_error
     from avneo_fem.results.report import to_json
     from avneo_fem.run import run_scene

@@ -65,7 +65,7 @@ def _size_cases() -> list[ExtremeCase]:
         (1.5, 0.6),
         (2.1, 0.5),
         (2.5, 0.42),
-        (2.8, 0.38),
+        (2.6, 0.41),
     ):
         cases.append(
             ExtremeCase(
@@ -76,7 +76,26 @@ def _size_cases() -> list[ExtremeCase]:
                 proportioned(BASE, alpha, ratio),
             )
         )
-    for alpha, ratio, why in ((1.0, 0.9, "small to close"), (2.8, 0.38, "large")):
+    shape = proportioned(BASE, 2.8, 0.38)
+    cases += [
+        ExtremeCase(
+            "l-2.8",
+            "L_f/a",
+            "2.8\nJ 0.38",
+            "L_f = 2.8 a at J_sl = 0.38, R_s = 11/26 L_f",
+            shape,
+            infeasible="contact curves of 2.8 a / sqrt(3) turn so far that they meet the wall",
+            diagnosis=r"the contact surface of cusp \d passes behind its suture line",
+        ),
+        ExtremeCase(
+            "l-2.8-planes",
+            "L_f/a",
+            "2.8\nplanes",
+            "the same with virtual planes as contact surfaces",
+            {**shape, "contact.method": "virtual_planes"},
+        ),
+    ]
+    for alpha, ratio, why in ((1.0, 0.9, "small to close"), (2.6, 0.41, "large")):
         cases.append(
             ExtremeCase(
                 f"l-{alpha:g}-policy-error",

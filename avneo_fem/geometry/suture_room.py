@@ -14,9 +14,7 @@ __all__ = ["require_suture_room"]
 _SAMPLES = 400
 
 
-def require_suture_room(
-    scene: Scene, geometry: ValveGeometry, wedges: ContactWedgeFamily
-) -> None:
+def require_suture_room(scene: Scene, geometry: ValveGeometry, wedges: ContactWedgeFamily) -> None:
     """Refuse a valve in which a contact surface passes behind the suture line of its cusp.
 
     The contact curves (3.3) of large cusps turn in a spiral. Between a flat angle of the triangle
