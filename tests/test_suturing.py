@@ -493,3 +493,19 @@ def test_without_pressure(tmp_path: Path) -> None:
     assert "unloading" in run.names
     assert setup.model.pressure == 0.0
     assert run.result.residual <= 1e-8
+
+
+def test_all_edges_are_clamped_until_a_wedge_is_in_the_way() -> None:
+    """Truth: before the wedge there is room for every half-plane; then edges that lead into the
+    neighbour turn as they must, and are laid down at the end, all but those that cannot be."""
+    suturing = CuspSuturing(set_up("[mesh]\nsize = 2.0\n"), lambda _index, _record: None)
+    clamp, row = suturing.setup.clamp, suturing.setup.row
+    assert row.is_blocked.any()
+    first = {level.name: level for level in reversed(suturing.levels)}
+    for name, active in (
+        ("clamped_edge", np.ones_like(row.is_blocked)),
+        ("contact_wedge", row.has_room),
+        ("first_row", ~row.is_left),
+    ):
+        suturing._activate(first[name], first[name].start)
+        np.testing.assert_array_equal(clamp.active, active)
