@@ -21,6 +21,7 @@ from avneo_fem.stages.checkpoint import Checkpoint, CheckpointStore
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.record import StageRecord
+from avneo_fem.stages.shortfall import shortfalls
 from avneo_fem.stages.suturing import CuspSuturing
 from run_cases import FAILING, SMALL
 
@@ -175,7 +176,9 @@ def test_clamp(done: Done) -> None:
         return clamp_error_deg(points, setup.mesh.triangles, pairs, setup.conormal)[1]
 
     assert rms(done.result.points) <= 5.0
-    assert rms(done.result.points) == pytest.approx(done.suturing.shortfalls(done.result.points)[2])
+    assert rms(done.result.points) == pytest.approx(
+        shortfalls(done.suturing.setup, done.result.points)[2]
+    )
     hinged = done.result.snapshots[11]
     assert hinged.name == "hinged_edge"
     assert rms(hinged.points) > 20.0
@@ -192,7 +195,7 @@ def test_clearances(done: Done) -> None:
     wedge = setup.wedges.wedge(1, 1.0).evaluate(points[free])[0] - 0.25
     assert wall.min() >= -0.3
     assert wedge.min() >= -0.3
-    misses = done.suturing.shortfalls(points)[:2]
+    misses = shortfalls(done.suturing.setup, points)[:2]
     assert misses == pytest.approx((max(0.0, -wall.min()), max(0.0, -wedge.min())), abs=1e-12)
 
 
@@ -222,7 +225,7 @@ def test_clearances_out_of_reach(done: Done, tmp_path: Path) -> None:
     run = after(done, 21, tmp_path, set_up(FAILING)).run()
     assert run.result.failure is not None
     assert run.result.failure.startswith("root_wall: ")
-    wall, wedge, clamp, layers = run.suturing.shortfalls(run.result.points)
+    wall, wedge, clamp, layers = shortfalls(run.suturing.setup, run.result.points)
     assert max(wall, wedge) > 0.001
     for text in (
         f"short of the clearance by {wall:.3f} mm from the wall",
@@ -246,7 +249,7 @@ def test_stiffness_is_raised_as_said(done: Done, tmp_path: Path) -> None:
     raised = [record for record in run.result.records if record.name == "root_wall"]
     assert run.result.failure is None
     assert raised
-    misses = run.suturing.shortfalls(run.result.points)
+    misses = shortfalls(run.suturing.setup, run.result.points)
     assert max(misses[:2]) <= 0.05
     assert misses[2] <= 7.0
     terms = (run.setup.wall, run.setup.wedge, run.setup.clamp)

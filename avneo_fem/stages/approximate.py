@@ -19,6 +19,7 @@ from avneo_fem.constraints.collision_response import CrossingsRemain, resolve
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.levels import Level
 from avneo_fem.stages.moves import Outcome
+from avneo_fem.stages.shortfall import outside
 from avneo_fem.stages.suturing import CuspSuturing
 
 __all__ = ["ApproximateSuturing"]
@@ -95,7 +96,7 @@ class ApproximateSuturing(CuspSuturing):
         allowed = scene.inside_tolerance(setup.cusp.thickness)
         limits = scene.wall.maximum_stiffness, scene.contact.maximum_stiffness
         for _ in range(_ROUNDS):
-            misses = self.outside(setup.system.positions(state))
+            misses = outside(setup, setup.system.positions(state))
             if max(misses) <= allowed:
                 return state
             for term, miss, limit in zip((setup.wall, setup.wedge), misses, limits, strict=True):
@@ -108,7 +109,7 @@ class ApproximateSuturing(CuspSuturing):
                 raise StageFailed(f"root_wall: {reason}", state, setup.wall.stiffness, 0)
             state = found
             self._keep(state, "root_wall", setup.wall.stiffness, used, reason, clock, 1, None)
-        wall, wedge = self.outside(setup.system.positions(state))
+        wall, wedge = outside(setup, setup.system.positions(state))
         message = (
             f"root_wall: outside the root by {wall:.3f} mm and the contact wedge by {wedge:.3f} mm"
             f" after {_ROUNDS} rounds; raise solver.approximate_iterations or take"

@@ -7,11 +7,10 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from avneo_fem.constraints.between_nodes import shortfall_between
-from avneo_fem.stages.blocked_edge import may_be_missed
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.moves import SETTLE_DAMPING
 from avneo_fem.stages.progress import CuspProgress
+from avneo_fem.stages.shortfall import bulging, may_be_missed_by_nodes, shortfalls
 
 __all__ = ["PenaltyRaising", "raising_factor"]
 
@@ -20,8 +19,6 @@ Floats = NDArray[np.float64]
 
 #: times at most that nodes are moved off because of what lies between them
 _ROUNDS = 8
-#: share of the tolerance that may be missing between nodes
-_BETWEEN = 0.8
 
 
 def raising_factor(
@@ -57,68 +54,6 @@ class PenaltyRaising(CuspProgress):
 
     _kept_off = 0
 
-    @property
-    def _inside(self) -> float:
-        """By how much nodes may miss clearances [mm]: the judge also looks between them."""
-        return 0.5 * self.setup.scene.inside_tolerance(self.setup.cusp.thickness)
-
-    def outside(self, points: Floats) -> tuple[float, float]:
-        """Largest depth of a node outside the root and outside the contact wedge [mm]."""
-        wall, wedge = self.setup.wall.evaluate(points)[0], self.setup.wedge.evaluate(points)[0]
-        return float((-wall).max(initial=0.0)), float((-wedge).max(initial=0.0))
-
-    def shortfalls(self, points: Floats) -> tuple[float, float, float, float]:
-        """How far wall, wedge, clamp and layers are from what they must hold.
-
-        Returns
-        -------
-        (wall, wedge, clamp, layers)
-            Largest miss of the clearances [mm], sutured and laid nodes apart; within the taper a
-            node need only be inside the root, and where there is little clearance from the wedge
-            a miss weighs more. Clamp: rms angle to the half-plane [degrees].
-        """
-        setup = self.setup
-        inside = self._inside
-        free = np.ones(len(points), dtype=bool)
-        free[setup.mesh.suture_line] = False
-        free[setup.row.nodes] = False
-        distance = setup.wall.evaluate(points)[0]
-        tapered = setup.wall.clearance < setup.wall.clearance.max()
-        wall = np.where(tapered, -distance, setup.wall.clearance - distance)
-        weight = inside / may_be_missed(setup.wedge.clearance, inside)
-        wedge = weight * setup.wedge.shortfall(points)
-        clamp = setup.clamp.rms_angle(points) if setup.scene.material.bending else 0.0
-        return (
-            float(wall[free].max(initial=0.0)),
-            float(wedge[free].max(initial=0.0)),
-            float(np.degrees(clamp)),
-            setup.layers.shortfall(points),
-        )
-
-    def _bulging(self, points: Floats) -> Floats:
-        """(n,) by how much edges from these nodes miss the clearance from the wedge, where that
-        is too much.
-
-        Next to the commissures neighbouring cusps lie at their clearance on both sides of the
-        wedge, and one end of the edges to the stitch cannot give way: as much as is judged.
-        Elsewhere a flat triangle that cuts a bend of the wedge has room on the other side of it,
-        unless triangles are large, or stretched: half of the clearance.
-        """
-        setup, edges = self.setup, self.setup.mesh.edges
-        held = np.zeros(len(points), dtype=bool)
-        held[setup.mesh.suture_line] = held[setup.row.nodes] = True
-        edges = edges[~held[edges].all(axis=1)]
-        clearance = setup.wedge_clearance
-        short = shortfall_between(setup.wedge.field, points, edges, clearance)
-        judged = _BETWEEN * setup.scene.inside_tolerance(setup.cusp.thickness)
-        half = clearance[edges].mean(axis=1) / 2.0
-        allowed = np.where(held[edges].any(axis=1), np.minimum(judged, half), half)
-        short[short <= allowed] = 0.0
-        result = np.zeros(len(points))
-        for ends in edges.T:
-            np.maximum.at(result, ends, short)
-        return np.where(held, 0.0, result)
-
     def _keep_off(self, points: Floats) -> bool:
         """Ask more clearance of nodes between which the surface is short of it.
 
@@ -129,7 +64,7 @@ class PenaltyRaising(CuspProgress):
             return False  # whether what is left matters, the verification says
         before = setup.wedge.clearance
         most = setup.wedge_clearance + setup.scene.mesh_size / 2
-        after = np.minimum(before + self._bulging(points), most)
+        after = np.minimum(before + bulging(setup, points), most)
         if np.array_equal(before, after):
             return False
         self._kept_off += 1
@@ -143,7 +78,7 @@ class PenaltyRaising(CuspProgress):
         if setup.layers.clearance > 0:
             # not before: coarse folds are sharper than the clearance
             setup.system.terms = [*setup.system.terms, setup.layers]
-        inside = self._inside
+        inside = may_be_missed_by_nodes(setup)
         allowed = (inside, inside, scene.clamp.tolerance_degrees, inside)
         limits = (
             scene.wall.maximum_stiffness,
@@ -153,7 +88,7 @@ class PenaltyRaising(CuspProgress):
         )
         tried: dict[int, tuple[float, float]] = {}
         while True:
-            misses = self.shortfalls(setup.system.positions(state))
+            misses = shortfalls(setup, setup.system.positions(state))
             late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
             if not any(late) and self._keep_off(setup.system.positions(state)):
                 state = self._converge(state, "root_wall", self.options.path_tolerance)
@@ -161,7 +96,7 @@ class PenaltyRaising(CuspProgress):
             if not any(late):
                 state = self._converge(state, "equilibrium", self.options.tolerance)
                 points = setup.system.positions(state)
-                misses = self.shortfalls(points)
+                misses = shortfalls(setup, points)
                 kept = all(miss <= most for miss, most in zip(misses, allowed, strict=True))
                 if kept and not self._keep_off(points):
                     return state
@@ -183,7 +118,7 @@ class PenaltyRaising(CuspProgress):
 
     def _what_is_missing(self, state: Floats) -> str:
         setup = self.setup
-        wall, wedge, clamp, layers = self.shortfalls(setup.system.positions(state))
+        wall, wedge, clamp, layers = shortfalls(setup, setup.system.positions(state))
         return (
             f"root_wall: short of the clearance by {wall:.3f} mm from the wall and {wedge:.3f} mm"
             f" from the contact wedge, layers by {layers:.3f} mm, clamp off by {clamp:.1f} degrees"
