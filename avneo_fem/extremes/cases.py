@@ -44,15 +44,16 @@ def _material_cases() -> list[ExtremeCase]:
         about = f"E = {e:g} kPa at P = {pressure:g} kPa"
         cases.append(ExtremeCase(f"e-{e:g}", "E", f"{e:g} kPa\nP {pressure:g}", about, entries))
     for e in (10.0, 100.0):
+        strain = 8.0 * 12.0 / (e * 0.5)
         cases.append(
             ExtremeCase(
                 f"e-{e:g}-full-pressure",
                 "E",
                 f"{e:g} kPa\nP 8",
-                f"E = {e:g} kPa under the whole 8 kPa",
+                f"E = {e:g} kPa under the whole 8 kPa, P R / (E H) = {strain:.2g}",
                 {**BASE, "material.young_modulus": e},
-                infeasible=_INFLATION.format(8.0 * 12.0 / (e * 0.5)),
-                diagnosis=_INFLATES,
+                infeasible=_INFLATION.format(strain) if strain > 10.0 else "",
+                diagnosis=_INFLATES if strain > 10.0 else "",
             )
         )
     for pressure in (0.0, 0.01, 1.0, 16.0, 40.0):
@@ -118,7 +119,6 @@ def _thickness_cases() -> list[ExtremeCase]:
             )
         )
     for h, pressure in ((0.05, _bearable(0.05)), (0.05, 8.0), (0.1, 8.0)):
-        strain = pressure * 12.0 / (1000.0 * h)
         name, label = f"h-{h:g}-apart", f"{h:g}\napart"
         if pressure < 8.0:
             name, label = f"{name}-low-pressure", f"{label} P {pressure:.2g}"
@@ -134,8 +134,6 @@ def _thickness_cases() -> list[ExtremeCase]:
                     "diastolic_pressure": pressure,
                     **_APART,
                 },
-                infeasible=_INFLATION.format(strain) if strain > 1.0 else "",
-                diagnosis=_INFLATES if strain > 1.0 else "",
             )
         )
     cases.append(

@@ -6,7 +6,7 @@ from avneo_fem.scene import Scene
 
 __all__ = ["inflation", "inflation_warning"]
 
-#: above it a cusp is stretched several times over: of the map of extremes nothing is verified there
+#: above it triangles come out several times as long as the mesh was made for (docs/extremes.md)
 _MOST = 1.0
 
 
@@ -21,8 +21,8 @@ def inflation_warning(scene: Scene) -> str | None:
     """What is wrong with pressure, modulus and thickness, and what would do; None if nothing is.
 
     The membrane energies have no limit of extension: a sheet under too much pressure becomes a
-    balloon with triangles several times as long as the mesh was made for, whose cusps cross
-    between nodes, or an equilibrium that no damping finds.
+    balloon whose triangles are several times as long as the mesh was made for. At a ratio of 2 it
+    may still be verified, at 20 nothing is.
     """
     strain = inflation(scene)
     if strain <= _MOST:
