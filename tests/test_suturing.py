@@ -186,11 +186,11 @@ def test_clamp(done: Done) -> None:
 
 def test_clearances(done: Done) -> None:
     """Truth: by the distances' formulas, no free node misses its clearance by more than the scene
-    allows: H/2 from the wedge (lambda = 1) and from the wall; within the taper just the
-    wall itself. The scene allows 0.3 mm, nodes half of that, and of the wedge half of what they
-    have to keep if that is less: a miss weighs more there."""
+    allows: H/2 from the wedge (lambda = 1), or what it has to keep off, and from the wall; within
+    the taper just the wall itself. The scene allows 0.3 mm, nodes half of that, and of the wedge
+    half of what they have to keep if that is less: a miss weighs more there."""
     setup, points = done.setup, done.result.points
-    free = np.setdiff1d(np.arange(len(points)), setup.mesh.suture_line)
+    free = np.setdiff1d(np.arange(len(points)), [*setup.mesh.suture_line, *setup.row.nodes])
     near = setup.mesh.distance_to_suture[free] < setup.scene.wall_taper(0.5)
     wall = 12.0 - np.hypot(*points[free, :2].T) - np.where(near, 0.0, 0.25)
     wedge = setup.wedges.wedge(1, 1.0).evaluate(points[free])[0] - 0.25
