@@ -512,20 +512,21 @@ NOTES = """## What it says
   nothing else differs, not that the solver is invariant, which `tests/test_invariances.py` is for.
   `copied_from` in the report, and turned against solved: `tests/test_congruence.py`; one cusp:
   `tests/test_suture_valve.py`.
-- **Terms before their stage** are not called once (`tests/test_savings.py`). At the end they would
-  double the cost of residual and tangent, the wedge most of all; the wall's and the layers' shares
+- **Terms before their stage** are not called once (`tests/test_savings.py`). At the end they
+  nearly double the cost of residual and tangent, the wedge most of all; the wall's and the layers' shares
   are small. A solve also factorises, which does not change, so of a whole run it is less.
 - **Layers**: their table of neighbours is made by the first who asks, so not on coarser meshes and
   not for `quality = "approximate"`. That is the dear part of `layers.clearance`; later queries live
   on the pairs kept.
-- **Bending off** has half the unknowns and less than a third of the kernels' work.
-- **Culling** of arcs solves a tenth of the quintics, for two fifths of the time: the rest is spent on
-  bounds, and on arrays too short for NumPy. On 109 nodes it saves a fifth.
+- **Bending off** has half the unknowns and takes less than a third of the assembly.
+- **Culling** of arcs solves a tenth of the quintics, for two fifths of the time: the rest is spent
+  on bounds, and on arrays too short for NumPy. On the 109 nodes of Experiment 3 at h = 2.8 mm it
+  saves no more than a fifth to a third.
 - **Not built**: wall and wedge compute their distance at all nodes, also at those that are too far
   for the penalty to act. Leaving these out would save up to a third of the wedge's distance here,
   little on coarse meshes.
-- **Analytic before sampled**: the wall in closed form, in NumPy and with both derivatives, takes a
-  tenth of what libigl's compiled tree takes for the distance alone. The contact wedge in closed
+- **Analytic before sampled**: the wall in closed form, in NumPy and with both derivatives, takes
+  less than a tenth of what libigl's compiled tree takes for the distance alone. The contact wedge in closed
   form is *no* saving of time against few flat strips, and a small one against many; what it buys is
   derivatives that Newton's method can use, where strips have normals that jump and no curvature.
 - **Not separate**: pressure and free-edge force act from the first stage on and are part of the one
