@@ -513,8 +513,8 @@ NOTES = """## What it says
   `copied_from` in the report, and turned against solved: `tests/test_congruence.py`; one cusp:
   `tests/test_suture_valve.py`.
 - **Terms before their stage** are not called once (`tests/test_savings.py`). At the end they
-  nearly double the cost of residual and tangent, the wedge most of all; the wall's and the layers' shares
-  are small. A solve also factorises, which does not change, so of a whole run it is less.
+  nearly double the cost of residual and tangent, the wedge most of all; the wall's and the layers'
+  shares are small. A solve also factorises, which does not change: of a whole run it is less.
 - **Layers**: their table of neighbours is made by the first who asks, so not on coarser meshes and
   not for `quality = "approximate"`. That is the dear part of `layers.clearance`; later queries live
   on the pairs kept.
@@ -526,9 +526,10 @@ NOTES = """## What it says
   for the penalty to act. Leaving these out would save up to a third of the wedge's distance here,
   little on coarse meshes.
 - **Analytic before sampled**: the wall in closed form, in NumPy and with both derivatives, takes
-  less than a tenth of what libigl's compiled tree takes for the distance alone. The contact wedge in closed
-  form is *no* saving of time against few flat strips, and a small one against many; what it buys is
-  derivatives that Newton's method can use, where strips have normals that jump and no curvature.
+  less than a tenth of what libigl's compiled tree takes for the distance alone. The contact
+  wedge in closed form is *no* saving of time against few flat strips, and a small one against many;
+  what it buys is derivatives that Newton's method can use: normals of strips jump, and they have no
+  curvature.
 - **Not separate**: pressure and free-edge force act from the first stage on and are part of the one
   compiled form; with a stiffness of zero they are still assembled.
 """
