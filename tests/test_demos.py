@@ -20,6 +20,10 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("pyvista")
 
 
+#: units in the table of savings that are no times
+COUNTED = {"forms", "number", "quintics"}
+
+
 def script(
     name: str, *options: str | Path, folder: Path = DEMOS, timeout: float = 900.0
 ) -> subprocess.CompletedProcess[str]:
@@ -212,3 +216,20 @@ def test_solver_variants(tmp_path: Path) -> None:
     rows = [line for line in text.splitlines() if line.startswith(("| as it is", "| quality"))]
     assert len(rows) == 2
     assert all(row.endswith("| converged |") for row in rows)
+
+
+def test_savings(tmp_path: Path) -> None:
+    """Truth: what is promised to be the same is the same (status 0), no term is called before its
+    stage, and each saving that does not hang on the size of the mesh is one."""
+    process = script("savings.py", "--quick", "--size", "2.8", "--out", tmp_path)
+    assert process.returncode == 0, process.stderr
+    text = (tmp_path / "savings.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()]
+    ratio = {row[0]: float(row[4]) for row in rows if len(row) == 6 and row[1] in COUNTED}
+    assert ratio["bending off: bending forms built"] == 0.0
+    assert ratio["bending off: unknowns"] < 0.6
+    assert ratio["contact wedge: quintics only on arcs that can be closest"] < 0.25
+    assert "missed:" not in text
+    calls = {row[0]: row[1:] for row in rows if len(row) == 10}
+    assert calls["boundary"][4:8] == ["0"] * 4
+    assert calls["clamped_edge"][6:8] == ["0"] * 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -80,12 +81,17 @@ class LayerClearance:
         triangles = mesh.triangles if clearance > 0 else mesh.triangles[:0]
         way = least_way(thickness, clearance)
         reach = clearance + width / 2
-        self._layers = LayerPairs(
-            mesh.points, triangles, mesh.distance_to_suture, unrestricted, way, reach
+        self._made = partial(
+            LayerPairs, mesh.points, triangles, mesh.distance_to_suture, unrestricted, way, reach
         )
         self._seen: Floats | None = None
         self._acting: list[_Acting] = []
         self._closest = np.inf
+
+    @cached_property
+    def _layers(self) -> LayerPairs:
+        """Made when first asked for: on coarser meshes nobody does."""
+        return self._made()
 
     @staticmethod
     def _areas_of_edges(mesh: CuspMesh) -> sp.csr_matrix:
