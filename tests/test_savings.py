@@ -72,7 +72,7 @@ def stages() -> dict[str, Counter[str]]:
 def test_terms_before_their_stage(stages: dict[str, Counter[str]]) -> None:
     """Truth: design.md §3: wall from the hinged edge on, clamp from the clamped edge on, wedge from
     its own stage on, layers when penalties are raised; not one call before, and from then on as
-    many as the shell has (the two distances are asked for at least as often)."""
+    many as the shell has."""
     names = list(stages)
     assert names == [
         "placement",
@@ -90,7 +90,7 @@ def test_terms_before_their_stage(stages: dict[str, Counter[str]]) -> None:
         assert all(stages[name][term] > 0 for name in names[place:])
     for name in names[names.index("clamped_edge") :]:
         assert stages[name]["clamp"] == stages[name]["barrier"] == stages[name]["shell"]
-        assert stages[name]["wall"] >= stages[name]["shell"]
+        assert stages[name]["wall"] == stages[name]["shell"]
 
 
 def test_distances_of_a_wedge_that_does_not_act(stages: dict[str, Counter[str]]) -> None:

@@ -277,3 +277,33 @@ def test_foreseen_on_a_curved_wall() -> None:
         back = penalty.foreseen((begins + 0.2)[:, None] * axis, -length * axis)
         np.testing.assert_array_equal(back.switched, -expected)
     assert not penalty.foreseen(points, around).switched.any()
+
+
+@VOLUMES
+def test_only_nodes_that_may_act_are_asked(build: Callable[[], SignedDistance]) -> None:
+    """Truth: on a walk of nodes in and out of the ramp, energy, gradient, Hessian and what is
+    foreseen are those of a penalty that asks all of them, to the bit, and fewer are asked."""
+
+    class Counted:
+        asked = 0
+
+        def evaluate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            self.asked += len(points)
+            return build().evaluate(points)
+
+    rng = np.random.default_rng(3)
+    field, points = Counted(), nodes_near(build(), -0.5, 6.0, count=200)
+    penalty = penalty_of(field, len(points))
+    for size in (0.01, 0.03, 1.0, 0.1, 0.01, 0.01, 2.0, 0.001):
+        points = points + size * rng.standard_normal(points.shape)
+        moves = 0.3 * rng.standard_normal(points.shape)
+        fresh = penalty_of(build(), len(points))
+        fresh.evaluate(points)
+        assert penalty.energy(points) == fresh.energy(points)
+        np.testing.assert_array_equal(penalty.gradient(points), fresh.gradient(points))
+        found, expected = penalty.hessian(points), fresh.hessian(points)
+        np.testing.assert_array_equal(found.toarray(), expected.toarray())
+        found, expected = penalty.foreseen(points, moves), fresh.foreseen(points, moves)
+        np.testing.assert_array_equal(found.switched, expected.switched)
+        np.testing.assert_array_equal(found.gradient, expected.gradient)
+    assert field.asked < 0.8 * 8 * len(points)

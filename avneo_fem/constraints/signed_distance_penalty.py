@@ -13,6 +13,8 @@ from avneo_fem.constraints.term import Foreseen, block_diagonal
 __all__ = ["SignedDistance", "SignedDistancePenalty"]
 
 Floats = NDArray[np.float64]
+#: nodes that were looked at, and distance, gradient, Hessian of all, infinite and zero elsewhere
+_Near = tuple[NDArray[np.bool_], Floats, Floats, Floats]
 
 
 class SignedDistance(Protocol):
@@ -39,6 +41,11 @@ class SignedDistancePenalty:
         eta_1 [kPa], eta_2 [mm].
     clearance : (n,) array
         d_0 of every node [mm]: below d_0 + eta_2/2 the force acts, at d_0 it is eta_1 S_n.
+
+    Notes
+    -----
+    Distances are asked for only where the force can act: |grad d| <= 1, so a node that was far
+    from its clearance is, until it has moved by as much.
     """
 
     def __init__(
@@ -62,14 +69,45 @@ class SignedDistancePenalty:
     def field(self, field: SignedDistance) -> None:
         self._field = field
         self._seen: Floats | None = None
+        self._asked: Floats | None = None
         self._value: tuple[Floats, Floats, Floats] = (np.empty(0),) * 3
+        self._near: _Near = (np.empty(0, dtype=bool), *self._value)
+        # where each node was when its distance was computed last, and what it was
+        self._known_at = np.zeros((len(self.node_areas), 3))
+        self._known = np.full(len(self.node_areas), -np.inf)
 
     def evaluate(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Distance, gradient and Hessian; the last answer is kept."""
+        """Distance, gradient and Hessian of all nodes (n, 3)."""
         if self._seen is None or not np.array_equal(self._seen, points):
             self._value = self.field.evaluate(points)
-            self._seen = points.copy()
+            self._seen = self._known_at = points.copy()
+            self._known = self._value[0]
         return self._value
+
+    def _where_it_acts(self, points: Floats, further: Floats | float = 0.0) -> _Near:
+        """What :meth:`evaluate` says where the force may act, also ``further`` (n,) from here.
+
+        Elsewhere the distance is infinite: the distance of a node that has moved by m since it was
+        known to be d is at least d - m.
+        """
+        moved = np.linalg.norm(points - self._known_at, axis=1)
+        near = self._known - moved - further <= self.clearance + self.width / 2
+        same = self._asked is not None and np.array_equal(self._asked, points)
+        if same and not np.any(near & ~self._near[0]):
+            return self._near
+        result = (
+            near,
+            np.full(len(points), np.inf),
+            np.zeros((len(points), 3)),
+            np.zeros((len(points), 3, 3)),
+        )
+        if near.any():
+            for all_nodes, there in zip(result[1:], self.field.evaluate(points[near]), strict=True):
+                all_nodes[near] = there
+        self._known_at = np.where(near[:, None], points, self._known_at)
+        self._known = np.where(near, result[1], self._known)
+        self._asked, self._near = points.copy(), result
+        return result
 
     def shortfall(self, points: Floats) -> Floats:
         """(n,) by how much each node misses its clearance, max(d_0 - d, 0) [mm]."""
@@ -77,7 +115,7 @@ class SignedDistancePenalty:
 
     def ramp(self, points: Floats) -> Floats:
         """f(d) at the nodes, (n,)."""
-        distance = self.evaluate(points)[0]
+        distance = self._where_it_acts(points)[1]
         return np.maximum(1.0 - 2.0 * (distance - self.clearance) / self.width, 0.0)
 
     def energy(self, points: Floats) -> float:
@@ -88,11 +126,11 @@ class SignedDistancePenalty:
     def gradient(self, points: Floats) -> Floats:
         """Minus the nodal forces (1.5), (n, 3) [mN]."""
         force = self.stiffness * self.node_areas * self.ramp(points)
-        return -force[:, None] * self.evaluate(points)[1]
+        return -force[:, None] * self._where_it_acts(points)[2]
 
     def hessian(self, points: Floats) -> sp.spmatrix:
         """Consistent tangent, block diagonal (3n, 3n) [mN/mm]."""
-        _, normal, curvature = self.evaluate(points)
+        _, _, normal, curvature = self._where_it_acts(points)
         ramp = self.ramp(points)
         load = self.stiffness * self.node_areas
         rate = load * 2.0 / self.width * (ramp > 0)
@@ -105,7 +143,9 @@ class SignedDistancePenalty:
         A node on its way into the ramp is not in :meth:`hessian`, one on its way out still is; a
         Newton step that knows neither runs into the ramp and is cut short. Linearised distance.
         """
-        distance, normal, _ = self.evaluate(points)
+        _, distance, normal, _ = self._where_it_acts(points, np.linalg.norm(moves, axis=1))
+        # where no step reaches, any ramp below zero will do
+        distance = np.where(np.isinf(distance), self.clearance + self.width, distance)
         ramp = 1.0 - 2.0 * (distance - self.clearance) / self.width
         ahead = ramp - 2.0 / self.width * np.einsum("nd,nd->n", normal, moves)
         switched = (ahead > 0).astype(int) - (ramp > 0)
