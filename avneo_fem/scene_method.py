@@ -132,11 +132,6 @@ class Mesh(Table):
         description="the cusp starts on a mesh of 2^refinements h, whose triangles are split into"
         " four that many times on the way; default as many as leave it at most R/4",
     )
-    grading: Annotated[float, Field(ge=0.2, le=5.0)] = Field(
-        1.0,
-        description="edge length far from the suture line over h, which holds at it; grows linearly"
-        " over three edges of the first mesh",
-    )
 
 
 class Placement(Table):

@@ -51,7 +51,6 @@ def nested_meshes(
     refinements: int,
     fewer_will_do: bool = True,
     joints: Sequence[float] | Floats = (),
-    grading: float = 1.0,
 ) -> list[CuspMesh]:
     """Meshes of a template, each a refinement of the one before, the last of edge length ``size``.
 
@@ -66,8 +65,7 @@ def nested_meshes(
     try:
         # one edge from the free edge to the first bend would leave no room for a first row
         at_ends = 2 if refinements == 0 and len(joints) else 1
-        first = size * 2.0**refinements
-        meshes = [triangulate_template(template, first, joints, at_ends, grading)]
+        meshes = [triangulate_template(template, size * 2.0**refinements, joints, at_ends)]
     except SceneError as error:
         if refinements == 0:
             raise
@@ -78,7 +76,7 @@ def nested_meshes(
                 f"the first mesh, {size * 2.0**refinements:.3g} mm, is too coarse: {error.valid};"
                 " take fewer, or leave it out",
             ) from None
-        return nested_meshes(template, size, refinements - 1, joints=joints, grading=grading)
+        return nested_meshes(template, size, refinements - 1, joints=joints)
     for _ in range(refinements):
         meshes.append(refine(meshes[-1], template))
     return meshes

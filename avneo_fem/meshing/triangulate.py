@@ -5,11 +5,10 @@ from __future__ import annotations
 import signal
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from avneo_fem.errors import SceneError
 from avneo_fem.meshing.cusp_mesh import CuspMesh
@@ -20,8 +19,6 @@ Floats = NDArray[np.float64]
 
 #: to what the outline is rounded, in units of the edge length
 _GRID = 2.0**-30
-#: over how many edges at the suture line a graded mesh changes its size
-_REACH = 3.0
 
 
 class _Path(Protocol):
@@ -54,24 +51,6 @@ def _divide(breaks: Floats, size: float, at_ends: int = 1) -> Floats:
     return np.r_[np.concatenate(parts), breaks[-1]]
 
 
-def _divide_graded(template: TemplateOutline, size: float, grading: float) -> Floats:
-    """The same for the free edge of a graded mesh: as many pieces as fit, long in proportion to
-    the size that is wanted where they are."""
-    path, line = template.free_edge, template.suture_line
-    ends = line.breaks
-    near = cKDTree(line.point(np.linspace(ends[0], ends[-1], int(50 * ends[-1] / size))))
-    parts = []
-    for start, stop in pairwise(path.breaks):
-        s = np.linspace(start, stop, int(50 * (stop - start) / size) + 50)
-        away = near.query(path.point(s))[0] / size
-        wanted = size * (1.0 + (grading - 1.0) * np.minimum(away / _REACH, 1.0))
-        per_length = 1.0 / wanted
-        count = np.r_[0.0, np.cumsum((per_length[1:] + per_length[:-1]) / 2 * np.diff(s))]
-        pieces = max(1, round(count[-1]))
-        parts.append(np.interp(np.linspace(0.0, count[-1], pieces + 1)[:-1], count, s))
-    return np.r_[np.concatenate(parts), path.breaks[-1]]
-
-
 def _with_joints(breaks: Floats, joints: Sequence[float] | Floats, size: float) -> Floats:
     """Breaks and those joints that leave no piece shorter than half of ``size``."""
     for joint in joints:
@@ -85,7 +64,6 @@ def triangulate_template(
     size: float,
     joints: Sequence[float] | Floats = (),
     at_ends: int = 1,
-    grading: float = 1.0,
 ) -> CuspMesh:
     """Mesh a template with target edge length ``size`` [mm].
 
@@ -98,8 +76,6 @@ def triangulate_template(
         shorter than half of ``size`` is left out.
     at_ends : int
         Edges at least of the first and of the last piece of the suture line, up to the first joint.
-    grading : float
-        Edge length far from the suture line over that at it; it grows linearly over three ``size``.
 
     Notes
     -----
@@ -113,10 +89,7 @@ def triangulate_template(
     """
     breaks = _with_joints(np.asarray(template.suture_line.breaks), joints, size)
     suture = _divide(breaks, size, at_ends)
-    if grading == 1.0:
-        free = _divide(np.asarray(template.free_edge.breaks), size)
-    else:
-        free = _divide_graded(template, size, grading)
+    free = _divide(np.asarray(template.free_edge.breaks), size)
     if len(suture) < 7:
         largest = float(template.suture_line.breaks[-1]) / 8
         raise SceneError(
@@ -125,47 +98,27 @@ def triangulate_template(
     outline = np.vstack(
         [template.suture_line.point(suture), template.free_edge.point(free)[-2:0:-1]]
     )
-    points, triangles = _fill(outline, size, len(suture) - 1, grading)
+    points, triangles = _fill(outline, size)
     number, ahead = len(suture), len(outline)
     free_edge = np.r_[0, np.arange(ahead - 1, number - 1, -1), number - 1]
     return CuspMesh(points, triangles, np.arange(number), suture, free_edge)
 
 
-def _fill(
-    outline: Floats, size: float, sutured: int, grading: float
-) -> tuple[Floats, NDArray[np.int64]]:
+def _fill(outline: Floats, size: float) -> tuple[Floats, NDArray[np.int64]]:
     """Triangles inside a counter-clockwise polygon, whose points come first in the result.
 
     gmsh sees lengths in units of ``size``, rounded: its tolerances are absolute, and where two
     points would do equally well the last bit decides which it takes. So the same template in
     another unit has the same mesh.
     """
-    points, triangles = _fill_units(np.round(outline / size / _GRID) * _GRID, sutured, grading)
+    points, triangles = _fill_units(np.round(outline / size / _GRID) * _GRID)
     points *= size
     points[: len(outline)] = outline
     return points, triangles
 
 
-def _grade(field: Any, lines: list[int], grading: float) -> None:
-    """Let gmsh's sizes change from 1 at these lines to ``grading``."""
-    away, law = field.add("Distance"), field.add("Threshold")
-    field.setNumbers(away, "CurvesList", lines)
-    field.setNumber(away, "NumPointsPerCurve", 20)
-    for option, value in (
-        ("InField", away),
-        ("SizeMin", 1.0),
-        ("SizeMax", grading),
-        ("DistMin", 0.0),
-        ("DistMax", _REACH),
-    ):
-        field.setNumber(law, option, value)
-    field.setAsBackgroundMesh(law)
-
-
-def _fill_units(
-    outline: Floats, sutured: int, grading: float
-) -> tuple[Floats, NDArray[np.int64]]:
-    """The same with a target edge length of 1 at the first ``sutured`` lines."""
+def _fill_units(outline: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """The same with a target edge length of 1."""
     interrupt = signal.getsignal(signal.SIGINT)  # before the import, which resets it already
     import gmsh
 
@@ -177,8 +130,8 @@ def _fill_units(
             ("Mesh.Algorithm", 6),
             ("Mesh.MeshSizeExtendFromBoundary", 0),
             ("Mesh.MeshSizeFromPoints", 0),
-            ("Mesh.MeshSizeMin", min(1.0, grading)),
-            ("Mesh.MeshSizeMax", max(1.0, grading)),
+            ("Mesh.MeshSizeMin", 1.0),
+            ("Mesh.MeshSizeMax", 1.0),
             ("Mesh.RandomSeed", 1),
         ):
             gmsh.option.setNumber(option, value)
@@ -193,8 +146,6 @@ def _fill_units(
             geo.mesh.setTransfiniteCurve(line, 2)
         geo.addPlaneSurface([geo.addCurveLoop(lines)])
         geo.synchronize()
-        if grading != 1.0:
-            _grade(gmsh.model.mesh.field, lines[:sutured], grading)
         gmsh.model.mesh.generate(2)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         kinds, _, nodes = gmsh.model.mesh.getElements(2)

@@ -50,7 +50,6 @@ def mesh_templates(given: ValveInput) -> list[list[CuspMesh]]:
                 scene.refinements,
                 scene.mesh.refinements is None,
                 joints,
-                scene.mesh.grading,
             )
         )
         known.append((table.template, joints, meshes[-1]))
