@@ -31,6 +31,8 @@ _BOUNDARY_DAMPING, SETTLE_DAMPING = 1.5, 0.6
 _BOUNDARY_ITERATIONS = 6
 #: iterations after a part of the way to the line of a finer mesh
 _REST_ITERATIONS = 100
+#: a triangle that is turned by more has turned over [rad]
+_OVER = np.radians(90.0)
 #: angle from which on an edge is turned gently [rad]
 _FAR = np.radians(60.0)
 
@@ -184,6 +186,10 @@ class CuspMoves:
         The penalty that takes the triangles along grows with it, by a factor of 4 a level.
         """
         setup, free = self.setup, self.setup.row.has_room
+        # as long as no wedge is in the way, there is room for all: what has turned over on its way
+        # to the stitch is turned back
+        over = np.abs(setup.clamp.angles(setup.system.positions(state))) > _OVER
+        setup.clamp.active = free | over
         trial = self._turned(state, free, (stop - start) / (1.0 - start))
         full, count = setup.scene.clamp.stiffness, self.options.clamp_steps
         setup.clamp.stiffness = full * 4.0 ** (count * (stop - 1.0))

@@ -191,9 +191,6 @@ class CuspSuturing(PenaltyRaising):
         elif name == "clamped_edge":
             setup.system.fix(setup.model.angle_dofs[self._suture_edges(setup.row.has_room)])
             setup.system.terms = [setup.wall, setup.clamp]
-            # as long as no wedge is in the way, there is room for all: what has turned over on
-            # its way to the stitch is turned back
-            setup.clamp.active = np.ones_like(setup.row.has_room)
         elif name == "contact_wedge":
             clamp = [setup.clamp] if setup.scene.material.bending else []
             setup.system.terms = [setup.wall, *clamp, setup.wedge]
