@@ -6,6 +6,7 @@ import pickle
 import tomllib
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -501,17 +502,29 @@ def test_without_pressure(tmp_path: Path) -> None:
     assert run.result.residual <= 1e-8
 
 
-def test_all_edges_are_clamped_until_a_wedge_is_in_the_way() -> None:
-    """Truth: before the wedge there is room for every half-plane; then edges that lead into the
-    neighbour turn as they must, and are laid down at the end, all but those that cannot be."""
-    suturing = CuspSuturing(set_up("[mesh]\nsize = 2.0\n"), lambda _index, _record: None)
-    clamp, row = suturing.setup.clamp, suturing.setup.row
-    assert row.is_blocked.any()
-    first = {level.name: level for level in reversed(suturing.levels)}
-    for name, active in (
-        ("clamped_edge", np.ones_like(row.is_blocked)),
-        ("contact_wedge", row.has_room),
-        ("first_row", ~row.is_left),
+def test_what_has_turned_over_is_clamped_until_a_wedge_is_in_the_way() -> None:
+    """Truth: before the wedge there is room for every half-plane, so a triangle beside a commissure
+    that points away from its own is clamped, too; then those that lead into the neighbour turn as
+    they must, and are laid down at the end, all but those that cannot be."""
+    setup = set_up("[mesh]\nsize = 2.0\n")
+    suturing = CuspSuturing(setup, lambda _index, _record: None)
+    clamp, row = setup.clamp, setup.row
+    blocked = np.flatnonzero(row.is_blocked)
+    assert len(blocked) > 1
+    turned = {int(blocked[0]): 100.0, int(blocked[1]): 80.0}
+    angles = np.zeros(len(clamp.apex))
+    angles[list(turned)] = np.radians(list(turned.values()))
+    state = np.zeros(setup.model.size)
+    with (
+        mock.patch.object(clamp, "angles", return_value=angles),
+        mock.patch.object(suturing, "_turned", lambda state, _chosen, _share: state),
+        mock.patch.object(suturing, "_settle", lambda _before, state: (state, "")),
     ):
+        suturing._turn_edge(state, 0.0, 0.2)
+    np.testing.assert_array_equal(clamp.active, row.has_room | (angles > np.radians(90.0)))
+    assert clamp.active[blocked[0]]
+    assert not clamp.active[blocked[1]]
+    first = {level.name: level for level in reversed(suturing.levels)}
+    for name, active in (("contact_wedge", row.has_room), ("first_row", ~row.is_left)):
         suturing._activate(first[name], first[name].start)
         np.testing.assert_array_equal(clamp.active, active)
