@@ -248,3 +248,11 @@ def test_room_for_a_first_row_next_to_the_free_edge(refinements: int) -> None:
     assert between[0] == pytest.approx(1.0)
     assert first.suture_arc_length[-1] - first.suture_arc_length[-2] == pytest.approx(1.0)
     assert np.isin(joints, first.suture_arc_length).all()
+
+
+def test_too_coarse_is_refused_all_the_same() -> None:
+    """Truth: pieces that are added at the ends of the suture line make no coarse mesh a fine one."""
+    outline = polygon()
+    joints = np.array([2.0, outline.suture_line.length - 2.0])
+    with pytest.raises(SceneError, match="too large for this template"):
+        nested_meshes(outline, 20.0, 0, joints=joints)

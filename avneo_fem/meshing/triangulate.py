@@ -90,7 +90,7 @@ def triangulate_template(
     breaks = _with_joints(np.asarray(template.suture_line.breaks), joints, size)
     suture = _divide(breaks, size, at_ends)
     free = _divide(np.asarray(template.free_edge.breaks), size)
-    if len(suture) < 7:
+    if len(_divide(breaks, size)) < 7:
         largest = float(template.suture_line.breaks[-1]) / 8
         raise SceneError(
             "mesh.size", size, f"too large for this template; use at most {largest:.3g} mm"
