@@ -251,7 +251,7 @@ def test_room_for_a_first_row_next_to_the_free_edge(refinements: int) -> None:
 
 
 def test_too_coarse_is_refused_all_the_same() -> None:
-    """Truth: pieces that are added at the ends of the suture line make no coarse mesh a fine one."""
+    """Truth: pieces that are added at the ends of the suture line make no coarse mesh finer."""
     outline = polygon()
     joints = np.array([2.0, outline.suture_line.length - 2.0])
     with pytest.raises(SceneError, match="too large for this template"):
