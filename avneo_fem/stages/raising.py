@@ -57,13 +57,17 @@ class PenaltyRaising(CuspProgress):
     def _keep_off(self, points: Floats) -> bool:
         """Ask more clearance of nodes between which the surface is short of it.
 
-        Whether there were any; a node is not moved off by more than half a triangle.
+        Whether there were any; a node is not moved off by more than half of its longest edge.
         """
-        setup = self.setup
+        setup, edges = self.setup, self.setup.mesh.edges
         if self._kept_off == _ROUNDS:
             return False  # whether what is left matters, the verification says
         before = setup.wedge.clearance
-        most = setup.wedge_clearance + setup.scene.mesh_size / 2
+        lengths = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+        longest = np.zeros(len(points))
+        for ends in edges.T:
+            np.maximum.at(longest, ends, lengths)
+        most = setup.wedge_clearance + longest / 2
         after = np.minimum(before + bulging(setup, points), most)
         if np.array_equal(before, after):
             return False
