@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.moves import SETTLE_DAMPING
 from avneo_fem.stages.progress import CuspProgress
-from avneo_fem.stages.shortfall import bulging, may_be_missed_by_nodes, shortfalls
+from avneo_fem.stages.shortfall import (
+    bulging,
+    largest_at_nodes,
+    may_be_missed_by_nodes,
+    shortfalls,
+)
 
 __all__ = ["PenaltyRaising", "raising_factor"]
 
@@ -64,10 +69,7 @@ class PenaltyRaising(CuspProgress):
             return False  # whether what is left matters, the verification says
         before = setup.wedge.clearance
         lengths = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
-        longest = np.zeros(len(points))
-        for ends in edges.T:
-            np.maximum.at(longest, ends, lengths)
-        most = setup.wedge_clearance + longest / 2
+        most = setup.wedge_clearance + largest_at_nodes(lengths, edges, len(points)) / 2
         after = np.minimum(before + bulging(setup, points), most)
         if np.array_equal(before, after):
             return False

@@ -9,7 +9,7 @@ from avneo_fem.constraints.between_nodes import shortfall_between
 from avneo_fem.stages.blocked_edge import may_be_missed
 from avneo_fem.stages.cusp_setup import CuspSetup
 
-__all__ = ["bulging", "may_be_missed_by_nodes", "outside", "shortfalls"]
+__all__ = ["bulging", "largest_at_nodes", "may_be_missed_by_nodes", "outside", "shortfalls"]
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +35,14 @@ def _held(setup: CuspSetup) -> NDArray[np.bool_]:
     held = np.zeros(len(setup.mesh.points), dtype=bool)
     held[setup.mesh.suture_line] = held[setup.row.nodes] = True
     return held
+
+
+def largest_at_nodes(values: Floats, edges: NDArray[np.int64], count: int) -> Floats:
+    """(count,) largest of the values (e,) >= 0 of the edges (e, 2) at each node; 0 without any."""
+    result = np.zeros(count)
+    for ends in edges.T:
+        np.maximum.at(result, ends, values)
+    return result
 
 
 def shortfalls(setup: CuspSetup, points: Floats) -> tuple[float, float, float, float]:
@@ -95,7 +103,4 @@ def bulging(setup: CuspSetup, points: Floats) -> Floats:
     half = clearance[edges].mean(axis=1) / 2.0
     allowed = np.where(held[edges].any(axis=1), np.minimum(judged, half), half)
     short[short <= allowed] = 0.0
-    result = np.zeros(len(points))
-    for ends in edges.T:
-        np.maximum.at(result, ends, short)
-    return np.where(held, 0.0, result)
+    return np.where(held, 0.0, largest_at_nodes(short, edges, len(points)))
