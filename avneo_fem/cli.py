@@ -89,6 +89,9 @@ def suture(
     set_: Set = None,
     cusp: Annotated[int | None, typer.Option(min=0, max=2, help="this cusp only")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on after a killed run")] = False,
+    picture: Annotated[
+        bool, typer.Option("--picture/--no-picture", help="valve.png; avneo plot draws it later")
+    ] = True,
     json: Json = False,
 ) -> None:
     """Suture the cusps of a scene and write the results to DIR."""
@@ -112,6 +115,7 @@ def suture(
             folder,
             resume=resume,
             only=cusp,
+            picture=picture,
             observer=_observer(rank),
             warn=lambda text: _people.print(f"[yellow]{escape(text)}[/]"),
         )

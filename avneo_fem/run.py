@@ -37,6 +37,7 @@ def run_scene(
     *,
     resume: bool = False,
     only: int | None = None,
+    picture: bool = True,
     observer: Callable[[int, StageRecord], None] = lambda _index, _record: None,
     warn: Callable[[str], None] = lambda _text: None,
     comm: Any = MPI.COMM_WORLD,
@@ -53,6 +54,8 @@ def run_scene(
         Go on from the checkpoints of a killed run of the same scene.
     only : int or None
         Just this cusp.
+    picture : bool
+        Draw ``valve.png``, which takes seconds of a draft.
     observer, warn : callables
         Told of completed levels, and of things that did not work but do not stop the run.
 
@@ -91,17 +94,18 @@ def run_scene(
         raise
     report = None
     if comm.rank == 0:
-        report = _finish(given, folder, results, clock, comm.size, warn)
+        report = _finish(given, folder, results, clock, comm.size, picture, warn)
         store.clear()
     return comm.bcast(report, root=0)
 
 
 def _open_folder(folder: Path) -> None:
-    """Make the folder, make sure that it takes files, and remove the report of an older run."""
+    """Make the folder, make sure that it takes files, and remove report and picture of an older run."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-        (folder / "report.json").unlink(missing_ok=True)
+        for name in ("report.json", "valve.png"):
+            (folder / name).unlink(missing_ok=True)
     except OSError as error:
         reason = f"cannot be used ({error.strerror})"
         raise SceneError("output folder", str(folder), reason) from None
@@ -113,6 +117,7 @@ def _finish(
     results: list[CuspResult],
     clock: float,
     ranks: int,
+    picture: bool,
     warn: Callable[[str], None],
 ) -> dict[str, Any]:
     scene, geometry, wedges = given.scene, given.geometry, given.wedges
@@ -138,7 +143,9 @@ def _finish(
     triangles, steps = _history(given, results)
     write_history(folder / "valve.xdmf", triangles, steps)
     try:
-        draw_results(given, folder / "valve.png", [(r.points, r.mesh.triangles) for r in results])
+        if picture:
+            surfaces = [(result.points, result.mesh.triangles) for result in results]
+            draw_results(given, folder / "valve.png", surfaces)
     except PictureError as error:
         warn(str(error))
     report = build_report(

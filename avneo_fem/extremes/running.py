@@ -118,7 +118,7 @@ def run_case(case: ExtremeCase, folder: Path, reference: Path | None, limit: flo
     with written_whole(scene) as temporary:
         temporary.write_text(scene_text(case), encoding="utf-8")
     command = [sys.executable, "-m", "avneo_fem", "suture", str(scene), "--json"]
-    command += ["-o", str(folder / _RESULTS)]
+    command += ["-o", str(folder / _RESULTS), "--no-picture"]
     if case.cusp is not None:
         command += ["--cusp", str(case.cusp)]
     clock = time.perf_counter()

@@ -10,20 +10,17 @@ from numpy.typing import NDArray
 from avneo_fem.stages.continuation import StageFailed
 from avneo_fem.stages.moves import SETTLE_DAMPING
 from avneo_fem.stages.progress import CuspProgress
-from avneo_fem.stages.shortfall import (
-    bulging,
-    largest_at_nodes,
-    may_be_missed_by_nodes,
-    shortfalls,
-)
+from avneo_fem.stages.shortfall import bulging, may_be_missed_by_nodes, shortfalls
 
 __all__ = ["PenaltyRaising", "raising_factor"]
 
 Floats = NDArray[np.float64]
 
 
-#: times at most that nodes are moved off because of what lies between them
+#: times at most that edges are sought to hold off
 _ROUNDS = 8
+#: share of what an edge may miss from which it is held off together with others
+_NEARLY = 0.5
 
 
 def raising_factor(
@@ -57,25 +54,24 @@ def raising_factor(
 class PenaltyRaising(CuspProgress):
     """The end of the stages (paper §3.4 step 3)."""
 
-    _kept_off = 0
+    _looked = 0
 
-    def _keep_off(self, points: Floats) -> bool:
-        """Ask more clearance of nodes between which the surface is short of it.
+    def _hold_off(self, points: Floats) -> bool:
+        """Hold off the wedge edges between whose nodes the surface is short of its clearance.
 
-        Whether there were any; a node is not moved off by more than half of its longest edge.
+        Whether there were any that were not held off already.
         """
-        setup, edges = self.setup, self.setup.mesh.edges
-        if self._kept_off == _ROUNDS:
+        system, between = self.setup.system, self.setup.between
+        if self._looked == _ROUNDS:
             return False  # whether what is left matters, the verification says
-        before = setup.wedge.clearance
-        lengths = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
-        most = setup.wedge_clearance + largest_at_nodes(lengths, edges, len(points)) / 2
-        after = np.minimum(before + bulging(setup, points), most)
-        if np.array_equal(before, after):
+        missed = bulging(self.setup, points)
+        if not (missed > 1.0)[~between.held_off].any():
             return False
-        self._kept_off += 1
-        setup.wedge.clearance = after
-        setup.wedge.field = setup.wedge_field(1.0)
+        self._looked += 1
+        if not between.held_off.any():
+            system.terms = [*system.terms, between]
+        # those that are nearly short, too: they would be next
+        between.hold_off(between.held_off | (missed > _NEARLY))
         return True
 
     def _raise_until_inside(self, state: Floats) -> Floats:
@@ -84,6 +80,8 @@ class PenaltyRaising(CuspProgress):
         if setup.layers.clearance > 0:
             # not before: coarse folds are sharper than the clearance
             setup.system.terms = [*setup.system.terms, setup.layers]
+        if setup.between.held_off.any():
+            setup.system.terms = [*setup.system.terms, setup.between]
         inside = may_be_missed_by_nodes(setup)
         allowed = (inside, inside, scene.clamp.tolerance_degrees, inside)
         limits = (
@@ -94,9 +92,10 @@ class PenaltyRaising(CuspProgress):
         )
         tried: dict[int, tuple[float, float]] = {}
         while True:
-            misses = shortfalls(setup, setup.system.positions(state))
+            points = setup.system.positions(state)
+            misses = shortfalls(setup, points)
             late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
-            if not any(late) and self._keep_off(setup.system.positions(state)):
+            if not any(late) and self._hold_off(points):
                 state = self._converge(state, "root_wall", self.options.path_tolerance)
                 continue
             if not any(late):
@@ -104,7 +103,7 @@ class PenaltyRaising(CuspProgress):
                 points = setup.system.positions(state)
                 misses = shortfalls(setup, points)
                 kept = all(miss <= most for miss, most in zip(misses, allowed, strict=True))
-                if kept and not self._keep_off(points):
+                if kept and not self._hold_off(points):
                     return state
                 continue
             raised = False
