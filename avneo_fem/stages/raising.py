@@ -95,7 +95,10 @@ class PenaltyRaising(CuspProgress):
             points = setup.system.positions(state)
             misses = shortfalls(setup, points)
             late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
-            if not any(late) and self._hold_off(points):
+            # also while nodes are late: raised alone, those on both sides of a sharp bend slide
+            # away from it and stretch the edge between them
+            more = self._hold_off(points)
+            if not any(late) and more:
                 state = self._converge(state, "root_wall", self.options.path_tolerance)
                 continue
             if not any(late):
