@@ -446,8 +446,9 @@ def test_going_on_from_a_refined_mesh(tmp_path: Path) -> None:
 
 def test_clearance_between_nodes(done: Done) -> None:
     """Truth: by brute force on the result, the surface next to the stitch keeps the clearance from
-    the wedge to 0.8 of the tolerance."""
+    the wedge to 0.8 of the tolerance; nodes ask for no less than the surface must keep."""
     setup, points = done.suturing.setup, done.result.points
+    assert (setup.wedge.clearance >= setup.wedge_clearance).all()
     held = np.zeros(len(points), dtype=bool)
     held[setup.mesh.suture_line] = held[setup.row.nodes] = True
     edges = setup.mesh.edges[held[setup.mesh.edges].sum(axis=1) == 1]
@@ -455,7 +456,7 @@ def test_clearance_between_nodes(done: Done) -> None:
     wedge = setup.wedges.wedge(1, 1.0)
     for share in np.linspace(0.2, 0.8, 13):
         place = (1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]]
-        ends = setup.wedge.clearance[edges]
+        ends = setup.wedge_clearance[edges]
         wanted = (1 - share) * ends[:, 0] + share * ends[:, 1]
         assert (wedge.signed_distance(place) >= wanted - 1.1 * allowed).all()
 

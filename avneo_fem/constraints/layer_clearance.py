@@ -96,8 +96,11 @@ class LayerClearance:
     @staticmethod
     def _areas_of_edges(mesh: CuspMesh) -> sp.csr_matrix:
         """(n, n) matrix with a third of the triangles' areas at each edge [mm^2], smaller first."""
-        ends, count = mesh.edges.T, len(mesh.points)
-        return sp.csr_matrix((mesh.edge_areas, (ends[0], ends[1])), shape=(count, count))
+        shares = np.bincount(
+            mesh.cell_edges.ravel(), np.repeat(mesh.cell_areas / 3, 3), minlength=len(mesh.edges)
+        )
+        count = len(mesh.points)
+        return sp.csr_matrix((shares, (mesh.edges[:, 0], mesh.edges[:, 1])), shape=(count, count))
 
     def _at(self, points: Floats) -> list[_Acting]:
         """Pairs that act at ``points``; the last answer is kept."""

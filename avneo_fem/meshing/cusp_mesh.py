@@ -87,12 +87,6 @@ class CuspMesh:
         return np.asarray(np.bincount(self.triangles.ravel(), weights, minlength=count), float)
 
     @cached_property
-    def edge_areas(self) -> Floats:
-        """(e,) a third of the area of the triangles at each edge [mm^2]."""
-        weights, count = np.repeat(self.cell_areas / 3, 3), len(self.edges)
-        return np.asarray(np.bincount(self.cell_edges.ravel(), weights, minlength=count), float)
-
-    @cached_property
     def suture_edges(self) -> Ints:
         """(k-1,) edge index of each piece of the suture line, from N_0 to N_1."""
         return self.edges_between(self.suture_line)

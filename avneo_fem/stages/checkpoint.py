@@ -25,7 +25,7 @@ class Checkpoint:
     """Where a cusp stands: the state, what it took, and how many levels are complete.
 
     ``penalty_stiffness`` is that of wall, wedge, clamp and layers, ``clamp_reference`` the
-    clamp's, ``held_off`` the edges that the wedge is kept from between nodes.
+    clamp's, ``wedge_clearance`` that of the nodes from the wedge.
     ``finished`` says that nothing is left to do; then ``residual`` and ``failure`` are those of
     the result.
     """
@@ -35,7 +35,7 @@ class Checkpoint:
     levels_done: int
     penalty_stiffness: tuple[float, float, float, float]
     clamp_reference: Floats
-    held_off: NDArray[np.bool_]
+    wedge_clearance: Floats
     records: list[StageRecord]
     snapshots: list[Snapshot]
     finished: bool = False

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from avneo_fem.constraints.between_nodes import BetweenNodesPenalty
 from avneo_fem.constraints.clamp_penalty import ClampPenalty
 from avneo_fem.constraints.layer_clearance import LayerClearance
 from avneo_fem.constraints.self_contact import SelfContact
@@ -93,8 +92,9 @@ class CuspSetup:
         Prescribed outward conormal b of the suture edges.
     path_pressure : float
         Pressure until the first row is in place [kPa], P or more.
-    between : BetweenNodesPenalty
-        The contact wedge between nodes; holds nothing off until a stage asks it to.
+    wedge_clearance : (n,) array
+        d_0 that the surface must keep from the contact wedge [mm]; ``wedge.clearance``, that of
+        the nodes, may become more.
     """
 
     def __init__(
@@ -117,8 +117,8 @@ class CuspSetup:
         middles = (mesh.suture_arc_length[1:] + mesh.suture_arc_length[:-1]) / 2
         self.conormal = self.cusp.sutured_conormal(middles)
         self.wall, self.wedge = self._penalties()
+        self.wedge_clearance = self.wedge.clearance
         self.wedge.field = self.wedge_field(0.0)
-        self.between = BetweenNodesPenalty(self.wedge, mesh.edges, mesh.edge_areas)
         self.clamp = self._clamp()
         self.layers = self._layers()
         self.row = self._blocked_row()

@@ -92,7 +92,7 @@ class CuspProgress(CuspMoves):
             levels_done=done,
             penalty_stiffness=(wall, wedge, clamp, layers),
             clamp_reference=setup.clamp.reference,
-            held_off=setup.between.held_off,
+            wedge_clearance=setup.wedge.clearance,
             records=self.records,
             snapshots=self.snapshots,
             finished=finished,

@@ -17,10 +17,8 @@ __all__ = ["PenaltyRaising", "raising_factor"]
 Floats = NDArray[np.float64]
 
 
-#: times at most that edges are sought to hold off
+#: times at most that nodes are moved off because of what lies between them
 _ROUNDS = 8
-#: share of what an edge may miss from which it is held off together with others
-_NEARLY = 0.5
 
 
 def raising_factor(
@@ -54,24 +52,27 @@ def raising_factor(
 class PenaltyRaising(CuspProgress):
     """The end of the stages (paper §3.4 step 3)."""
 
-    _looked = 0
+    _kept_off = 0
 
-    def _hold_off(self, points: Floats) -> bool:
-        """Hold off the wedge edges between whose nodes the surface is short of its clearance.
+    def _keep_off(self, points: Floats) -> bool:
+        """Ask more clearance of nodes between which the surface is short of it.
 
-        Whether there were any that were not held off already.
+        Whether there were any. No node is moved off by more than half of a usual edge, however
+        long its own are: across a sharp bend, where there is no room to move off to, nodes slide
+        away on both sides, the edge between them grows, and would ask for ever more.
         """
-        system, between = self.setup.system, self.setup.between
-        if self._looked == _ROUNDS:
+        setup, edges = self.setup, self.setup.mesh.edges
+        if self._kept_off == _ROUNDS:
             return False  # whether what is left matters, the verification says
-        missed = bulging(self.setup, points)
-        if not (missed > 1.0)[~between.held_off].any():
+        before = setup.wedge.clearance
+        lengths = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+        most = setup.wedge_clearance + float(np.median(lengths)) / 2
+        after = np.minimum(before + bulging(setup, points), most)
+        if np.array_equal(before, after):
             return False
-        self._looked += 1
-        if not between.held_off.any():
-            system.terms = [*system.terms, between]
-        # those that are nearly short, too: they would be next
-        between.hold_off(between.held_off | (missed > _NEARLY))
+        self._kept_off += 1
+        setup.wedge.clearance = after
+        setup.wedge.field = setup.wedge_field(1.0)
         return True
 
     def _raise_until_inside(self, state: Floats) -> Floats:
@@ -80,8 +81,6 @@ class PenaltyRaising(CuspProgress):
         if setup.layers.clearance > 0:
             # not before: coarse folds are sharper than the clearance
             setup.system.terms = [*setup.system.terms, setup.layers]
-        if setup.between.held_off.any():
-            setup.system.terms = [*setup.system.terms, setup.between]
         inside = may_be_missed_by_nodes(setup)
         allowed = (inside, inside, scene.clamp.tolerance_degrees, inside)
         limits = (
@@ -92,13 +91,9 @@ class PenaltyRaising(CuspProgress):
         )
         tried: dict[int, tuple[float, float]] = {}
         while True:
-            points = setup.system.positions(state)
-            misses = shortfalls(setup, points)
+            misses = shortfalls(setup, setup.system.positions(state))
             late = [miss > most for miss, most in zip(misses, allowed, strict=True)]
-            # also while nodes are late: raised alone, those on both sides of a sharp bend slide
-            # away from it and stretch the edge between them
-            more = self._hold_off(points)
-            if not any(late) and more:
+            if not any(late) and self._keep_off(setup.system.positions(state)):
                 state = self._converge(state, "root_wall", self.options.path_tolerance)
                 continue
             if not any(late):
@@ -106,7 +101,7 @@ class PenaltyRaising(CuspProgress):
                 points = setup.system.positions(state)
                 misses = shortfalls(setup, points)
                 kept = all(miss <= most for miss, most in zip(misses, allowed, strict=True))
-                if kept and not self._hold_off(points):
+                if kept and not self._keep_off(points):
                     return state
                 continue
             raised = False

@@ -37,6 +37,14 @@ def _held(setup: CuspSetup) -> NDArray[np.bool_]:
     return held
 
 
+def _largest_at_nodes(values: Floats, edges: NDArray[np.int64], count: int) -> Floats:
+    """(count,) largest of the values (e,) >= 0 of the edges (e, 2) at each node; 0 without any."""
+    result = np.zeros(count)
+    for ends in edges.T:
+        np.maximum.at(result, ends, values)
+    return result
+
+
 def shortfalls(setup: CuspSetup, points: Floats) -> tuple[float, float, float, float]:
     """How far wall, wedge, clamp and layers are from what they must hold.
 
@@ -50,30 +58,26 @@ def shortfalls(setup: CuspSetup, points: Floats) -> tuple[float, float, float, f
     -------
     (wall, wedge, clamp, layers)
         Largest miss of the clearances [mm], sutured and laid nodes apart; within the taper a node
-        need only be inside the root. From the wedge a miss weighs more where there is little
-        clearance, and edges that are held off count as nodes do, in proportion to what they may
-        miss. Clamp: rms angle to the half-plane [degrees].
+        need only be inside the root, and where there is little clearance from the wedge a miss
+        weighs more. Clamp: rms angle to the half-plane [degrees].
     """
     inside, free = may_be_missed_by_nodes(setup), ~_held(setup)
     distance = setup.wall.evaluate(points)[0]
     tapered = setup.wall.clearance < setup.wall.clearance.max()
     wall = np.where(tapered, -distance, setup.wall.clearance - distance)
     weight = inside / may_be_missed(setup.wedge.clearance, inside)
-    wedge = (weight * setup.wedge.shortfall(points))[free].max(initial=0.0)
-    held_off = setup.between.held_off
-    if held_off.any():
-        wedge = max(wedge, inside * bulging(setup, points)[held_off].max())
+    wedge = weight * setup.wedge.shortfall(points)
     clamp = setup.clamp.rms_angle(points) if setup.scene.material.bending else 0.0
     return (
         float(wall[free].max(initial=0.0)),
-        float(wedge),
+        float(wedge[free].max(initial=0.0)),
         float(np.degrees(clamp)),
         setup.layers.shortfall(points),
     )
 
 
 def bulging(setup: CuspSetup, points: Floats) -> Floats:
-    """By how much edges miss the clearance from the wedge, over what they may miss.
+    """By how much edges from a node miss the clearance from the wedge, where that is too much.
 
     Next to the commissures neighbouring cusps lie at their clearance on both sides of the wedge,
     and one end of the edges to the stitch cannot give way: as much as is judged. Elsewhere a flat
@@ -88,16 +92,15 @@ def bulging(setup: CuspSetup, points: Floats) -> Floats:
 
     Returns
     -------
-    (e,) array
-        Above 1 too much is missed; 0 at edges neither of whose ends can give way.
+    (n,) array
+        0 at nodes that cannot give way [mm].
     """
     held, edges = _held(setup), setup.mesh.edges
-    result = np.zeros(len(edges))
-    looked = np.flatnonzero(~held[edges].all(axis=1))
-    edges, clearance = edges[looked], setup.wedge.clearance
+    edges = edges[~held[edges].all(axis=1)]
+    clearance = setup.wedge_clearance
     short = shortfall_between(setup.wedge.field, points, edges, clearance)
     judged = _BETWEEN * setup.scene.inside_tolerance(setup.cusp.thickness)
-    mean = clearance[edges].mean(axis=1)
-    careful = may_be_missed(mean, judged)
-    result[looked] = short / np.where(held[edges].any(axis=1), careful, np.fmax(mean / 2, careful))
-    return result
+    half = clearance[edges].mean(axis=1) / 2.0
+    allowed = np.where(held[edges].any(axis=1), np.minimum(judged, half), half)
+    short[short <= allowed] = 0.0
+    return np.where(held, 0.0, _largest_at_nodes(short, edges, len(points)))

@@ -175,7 +175,7 @@ class CuspSuturing(PenaltyRaising):
         for term, value in zip(self._penalties(), stiffness, strict=True):
             term.stiffness = value
         self.setup.clamp.reference = checkpoint.clamp_reference
-        self.setup.between.hold_off(checkpoint.held_off)
+        self.setup.wedge.clearance = checkpoint.wedge_clearance
         self._set_directors(checkpoint.directors)
         return checkpoint.state
 
