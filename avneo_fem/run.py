@@ -100,7 +100,7 @@ def run_scene(
 
 
 def _open_folder(folder: Path) -> None:
-    """Make the folder, make sure that it takes files, and remove report and picture of an older run."""
+    """Make the folder, see that it takes files, and remove report and picture of an older run."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()

@@ -141,6 +141,7 @@ def column(result: Result) -> dict[str, str]:
         "distance from the wall [mm]": cell(found["min_wall_distance_mm"], three),
         "outside the root [mm]": cell(of("outside_root_mm"), lambda x: f"{x:.3f}"),
         "outside the wedge [mm]": cell(of("outside_wedge_mm"), lambda x: f"{x:.3f}"),
+        "edges between nodes [mm]": cell(of("edges_outside_wedge_mm"), lambda x: f"{x:.3f}"),
         "sag of the free edge [mm]": cell(of("free_edge_sag_mm"), lambda x: f"{x:.3f}"),
         "clamp error, rms [degrees]": cell(clamp, lambda x: f"{x:.1f}"),
         "principal stretches": cell([f"{x.min():.1g} to {x.max():.2f}" for x in stretches], str),
@@ -157,6 +158,7 @@ TOLD = """\
 Three figures are those of cusps 0, 1 and 2, one figure that of all; "none" is no two layers near
 each other. Residuals are those of the undamped equations over the pressure load. Separations are
 distances of mid-surfaces, those of layers away from the suture; the thickness is 0.5 mm.
+Outside root and wedge are nodes; the line below says how deep the edges between them cut the wedge.
 Stretches are principal stretches of triangles, the squeezed ones of the first row at the suture
 included: the gather of 3 to 1 prescribes 0.33 there. Seconds are those of one run on a shared
 machine, all cusps after each other (Experiment 1 solves one and turns it).

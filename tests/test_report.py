@@ -77,7 +77,9 @@ def result(given: ValveInput, index: int, copied_from: int | None = None) -> Cus
 
 
 def measured(residual: float = 1e-9) -> CuspVerification:
-    return CuspVerification(residual, 1e-12, (31.0, 12.0), 0.0, 0.01, 0.0, 0, 0.24, np.inf, 0.07)
+    return CuspVerification(
+        residual, 1e-12, (31.0, 12.0), 0.0, 0.01, 0.02, 0.0, 0, 0.24, np.inf, 0.07
+    )
 
 
 def report(given: ValveInput, failures: list[str]) -> dict[str, Any]:

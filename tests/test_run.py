@@ -48,6 +48,7 @@ CUSP: dict[str, Any] = {
     "clamp_error_deg": {"largest": float, "rms": float},
     "outside_root_mm": float,
     "outside_wedge_mm": float,
+    "edges_outside_wedge_mm": float,
     "free_edge_sag_mm": float,
     "self_intersections": int,
     "copied_from": (int, type(None)),

@@ -26,6 +26,7 @@ from avneo_fem.results.verify import (
     ValveVerification,
     clamp_error_deg,
     cusp_intersections,
+    edges_outside_wedge_mm,
     free_edge_sag_mm,
     judge,
     min_distance,
@@ -227,6 +228,20 @@ def test_wedge_of_two_straight_arms(opening, extended):
     assert outside_wedge_mm(points[truth > 0], curve, inside) == 0.0
 
 
+def test_edges_cut_a_corner():
+    """Truth: nodes on both arms' sides of a reflex corner are inside; the middle of the edge
+    between them is as deep outside as the corner sticks out, and where nothing is near no edge is
+    outside."""
+    curve = np.array([[0.0, 5.0], [0.0, 0.0], [0.0, 0.0], [5.0, 0.0]])
+    inside = np.array([-1.0, -1.0])
+    points = np.array([[-0.2, 1.0, 0.0], [1.0, -0.2, 0.0], [-9.0, -9.0, 0.0], [-9.0, -8.0, 1.0]])
+    assert outside_wedge_mm(points, curve, inside) == 0.0
+    # halfway the edge is at (0.4, 0.4)
+    found = edges_outside_wedge_mm(points, np.array([[0, 1, 2]]), curve, inside)
+    assert found == pytest.approx(0.4)
+    assert edges_outside_wedge_mm(points, np.array([[0, 2, 3]]), curve, inside) == 0.0
+
+
 def test_wedge_along_a_winding_curve():
     """Truth: a step along the normal, shorter than the radius of curvature, is the distance."""
     t = np.linspace(-3.0, 3.0, 2001)
@@ -413,7 +428,7 @@ def test_verify_valve_of_crossing_patches():
         verify_valve([patch(1.0)], [BOUNDS] * 2, [0.0])
 
 
-GOOD = CuspVerification(1e-9, 1e-12, (9.0, 4.0), 0.01, 0.02, 0.05, 0, 0.24, 0.21, 0.001)
+GOOD = CuspVerification(1e-9, 1e-12, (9.0, 4.0), 0.01, 0.02, 0.04, 0.05, 0, 0.24, 0.21, 0.001)
 LIMITS = Tolerances(
     residual=1e-8,
     clamp_deg=5.0,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "edges_outside_wedge_mm",
     "min_wall_distance",
     "outside_root_mm",
     "outside_wedge_mm",
@@ -19,6 +20,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 _ROWS = 1024  # points per block: bounds the memory
+_PLACES = np.linspace(0.1, 0.9, 9)  # on an edge
 
 
 def wall_excess(points: Array, radius: float) -> Array:
@@ -127,3 +129,22 @@ def wedge_distance(points: Array, polyline: Array, inside_reference: Array) -> A
 def outside_wedge_mm(points: Array, polyline: Array, inside_reference: Array) -> float:
     """Largest depth of the nodes beyond the wedge, 0 when inside; see :func:`wedge_distance`."""
     return float((-wedge_distance(points, polyline, inside_reference)).max(initial=0.0))
+
+
+def edges_outside_wedge_mm(
+    points: Array, triangles: NDArray[np.int_], polyline: Array, inside_reference: Array
+) -> float:
+    """Largest depth of the edges of ``triangles`` (m, 3) beyond the wedge, 0 when inside.
+
+    Looked at in nine places of each: a flat triangle cuts the bends of a curved wedge though its
+    nodes are inside. See :func:`wedge_distance`.
+    """
+    sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    ends = points[np.unique(sides, axis=0)]
+    at_ends = [wedge_distance(ends[:, k], polyline, inside_reference) for k in (0, 1)]
+    # nothing on an edge is farther from its ends than it is long
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    near = ends[at_ends[0] + at_ends[1] < length]
+    share = _PLACES[:, None, None]
+    places = ((1.0 - share) * near[:, 0] + share * near[:, 1]).reshape(-1, 3)
+    return outside_wedge_mm(places, polyline, inside_reference)

@@ -14,7 +14,8 @@ class CuspVerification:
     """What was measured on one cusp; names as in report.json (design.md §2).
 
     The two closest approaches of its layers are infinite where none come near each other
-    (:mod:`avneo_fem.results.layers`).
+    (:mod:`avneo_fem.results.layers`). Of the wedge the nodes are judged, and of the triangles the
+    distance from the other cusps; how deep their edges cut the wedge's bends is reported.
     """
 
     residual: float
@@ -22,6 +23,7 @@ class CuspVerification:
     clamp_error_deg: tuple[float, float]
     outside_root_mm: float
     outside_wedge_mm: float
+    edges_outside_wedge_mm: float
     free_edge_sag_mm: float
     self_intersections: int
     min_wall_distance_mm: float

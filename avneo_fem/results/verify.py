@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from avneo_fem.errors import SolveError
 from avneo_fem.results.containment import (
+    edges_outside_wedge_mm,
     min_wall_distance,
     outside_root_mm,
     outside_wedge_mm,
@@ -33,6 +34,7 @@ __all__ = [
     "clamp_error_deg",
     "closest_layers",
     "cusp_intersections",
+    "edges_outside_wedge_mm",
     "free_edge_sag_mm",
     "judge",
     "min_distance",
@@ -181,6 +183,9 @@ def verify_cusp(
         ),
         outside_root_mm=outside_root_mm(points, constraints.radius),
         outside_wedge_mm=outside_wedge_mm(points, constraints.wedge, constraints.wedge_inside),
+        edges_outside_wedge_mm=edges_outside_wedge_mm(
+            points, triangles, constraints.wedge, constraints.wedge_inside
+        ),
         free_edge_sag_mm=free_edge_sag_mm(
             points[surface.free_edge_nodes],
             surface.template_height,
