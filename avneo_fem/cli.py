@@ -41,7 +41,7 @@ def check(scene: Scene, fidelity: Fidelity = None, set_: Set = None, json: Json 
     given = ValveInput.from_scene(loaded)
     geometry = geometry_report(given.geometry, given.wedges)
     show_geometry(_people, geometry)
-    _warn_of_inflation(loaded)
+    _forewarn(given)
     if json:
         sys.stdout.write(to_json(geometry))
 
@@ -60,11 +60,10 @@ def size(scene: Scene, json: Json = False) -> None:
         raise typer.Exit(1)
 
 
-def _warn_of_inflation(loaded: Any) -> None:
-    from avneo_fem.results.inflation import inflation_warning
+def _forewarn(given: Any) -> None:
+    from avneo_fem.results.forewarnings import forewarnings
 
-    text = inflation_warning(loaded)
-    if text is not None:
+    for text in forewarnings(given):
         _people.print(f"[yellow]{escape(text)}[/]")
 
 
@@ -101,7 +100,7 @@ def suture(
     given = ValveInput.from_scene(loaded)
     if not given.geometry.competent:
         _people.print(f"[yellow]not competent:[/] {escape(given.geometry.competence_reason)}")
-    _warn_of_inflation(loaded)
+    _forewarn(given)
     from avneo_fem.compat import MPI, install_abort_on_error
     from avneo_fem.results.report import to_json
     from avneo_fem.run import run_scene

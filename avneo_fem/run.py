@@ -16,8 +16,8 @@ from avneo_fem.errors import SceneError
 from avneo_fem.geometry.valve_input import ValveInput
 from avneo_fem.results.drawing import drawing_of
 from avneo_fem.results.fields import principal_stresses, principal_stretches
+from avneo_fem.results.forewarnings import forewarnings
 from avneo_fem.results.history import HistoryStep, write_history
-from avneo_fem.results.inflation import inflation_warning
 from avneo_fem.results.pictures import PictureError, draw_valve
 from avneo_fem.results.report import build_report, geometry_report, write_report
 from avneo_fem.results.surfaces import write_stl
@@ -130,9 +130,8 @@ def _finish(
         f"cusp {result.index}: {result.failure}" for result in results if result.failure is not None
     ]
     failures += judge(verification, tolerances_of(given))
-    inflated = inflation_warning(scene)
-    if failures and inflated is not None:
-        failures.append(inflated)
+    if failures:
+        failures += forewarnings(given)
     for result in results:
         write_stl(
             folder / f"cusp_{result.index}.stl",

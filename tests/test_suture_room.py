@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from avneo_fem.errors import SceneError
 from avneo_fem.extremes.shaping import chords_by_angles, proportioned
+from avneo_fem.geometry.suture_room import narrow_room_warning
 from avneo_fem.geometry.valve_input import ValveInput
+from avneo_fem.results.forewarnings import forewarnings
 from avneo_fem.scene import parse_scene
 
 _ANGLES = (110.0, 35.0, 35.0)
@@ -42,10 +45,35 @@ def test_smaller_cusps_or_planes_have_room() -> None:
     _narrow(1.5, method="virtual_planes")
 
 
-def test_experiments_have_room() -> None:
-    """Truth: the paper sutures Experiment 2, whose free edges are as unequal as 3 : 2."""
+def _experiment_2(thickness: float) -> ValveInput:
     factors = (1.5, 1.0, 1.25)
     cusps = [{"template": {"free_edge_length": 39 * g, "belly_radius": 16.5 * g}} for g in factors]
-    ValveInput.from_scene(
-        parse_scene({"commissures": {"chord_ratio": [8.0, 9.0, 6.0]}, "cusp": cusps})
-    )
+    scene = {
+        "commissures": {"chord_ratio": [8.0, 9.0, 6.0]},
+        "template": {"thickness": thickness},
+        "cusp": cusps,
+    }
+    return ValveInput.from_scene(parse_scene(scene))
+
+
+def test_experiments_have_room() -> None:
+    """Truth: the paper sutures Experiment 2, whose free edges are as unequal as 3 : 2."""
+    _experiment_2(0.5)
+
+
+def test_narrow_room() -> None:
+    """Truth: by brute force along the wall, the contact surface of cusp 0 of Experiment 2 leaves
+    0.46 mm between two places with several mm; a sheet of 0.4 mm has room, that of 0.5 mm has not,
+    and Experiment 1 has no narrow place."""
+    given = _experiment_2(0.5)
+    around = np.radians(np.linspace(150.0, 195.0, 4001))
+    wall = np.column_stack([12 * np.cos(around), 12 * np.sin(around), np.full(4001, -5.0)])
+    room = given.wedges.wedge(0, 1.0).signed_distance(wall)
+    least = int(np.argmin(room))
+    told = narrow_room_warning(given.geometry, given.wedges)
+    assert told is not None
+    assert told.startswith(f"the contact surface of cusp 0 passes {room[least]:.2f} mm from the")
+    assert f" {np.degrees(around[least]):.0f} degrees," in told
+    assert forewarnings(given) == [told]
+    assert forewarnings(_experiment_2(0.4)) == []
+    assert forewarnings(ValveInput.from_scene(parse_scene({}))) == []
