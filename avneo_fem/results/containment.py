@@ -20,7 +20,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 _ROWS = 1024  # points per block: bounds the memory
-_PLACES = np.linspace(0.1, 0.9, 9)  # on an edge
+_HALVINGS = 4  # of an edge
 
 
 def wall_excess(points: Array, radius: float) -> Array:
@@ -136,15 +136,25 @@ def edges_outside_wedge_mm(
 ) -> float:
     """Largest depth of the edges of ``triangles`` (m, 3) beyond the wedge, 0 when inside.
 
-    Looked at in nine places of each: a flat triangle cuts the bends of a curved wedge though its
-    nodes are inside. See :func:`wedge_distance`.
+    A flat triangle cuts the bends of a curved wedge though its nodes are inside. Edges are halved
+    where what lies between two places can be outside, to sixteenths at most. See
+    :func:`wedge_distance`.
     """
+    distance = wedge_distance(points, polyline, inside_reference)
     sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    ends = points[np.unique(sides, axis=0)]
-    at_ends = [wedge_distance(ends[:, k], polyline, inside_reference) for k in (0, 1)]
-    # nothing on an edge is farther from its ends than it is long
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    near = ends[at_ends[0] + at_ends[1] < length]
-    share = _PLACES[:, None, None]
-    places = ((1.0 - share) * near[:, 0] + share * near[:, 1]).reshape(-1, 3)
-    return outside_wedge_mm(places, polyline, inside_reference)
+    ends = np.unique(sides, axis=0)
+    place, value = points[ends], distance[ends]
+    deepest = float((-distance).max(initial=0.0))
+    for _ in range(_HALVINGS):
+        # no place is nearer to the wedge than the ends of its piece less the way there
+        length = np.linalg.norm(place[:, 1] - place[:, 0], axis=1)
+        near = value.sum(axis=1) - length < -2.0 * deepest
+        place, value = place[near], value[near]
+        if not len(place):
+            break
+        middle = place.mean(axis=1)
+        there = wedge_distance(middle, polyline, inside_reference)
+        deepest = max(deepest, float((-there).max()))
+        place = np.concatenate([np.stack([place[:, k], middle], axis=1) for k in (0, 1)])
+        value = np.concatenate([np.stack([value[:, k], there], axis=1) for k in (0, 1)])
+    return deepest
