@@ -11,9 +11,8 @@
 # %%
 from __future__ import annotations
 
-from expected import asked, demand, equal, geometry_figures, suture, sutured_figures, valve
-
 from avneo_fem.results.forewarnings import forewarnings
+from expected import asked, demand, equal, geometry_figures, suture, sutured_figures, valve
 
 page = asked("Experiment 2: three cusps that do not suit", "experiment-2")
 given = valve("experiment_2.toml", page.size)
