@@ -116,3 +116,15 @@ def test_a_discarded_factorization_frees_its_factors() -> None:
     assert solver.handle != 0
     del kept
     assert solver.handle == 0
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_ordering_is_the_one_asked_for(symmetric: bool) -> None:
+    """Truth: MUMPS says which ordering it used, INFOG(7); 0 is approximate minimum degree. (Set
+    like its other controls it would be overwritten.)"""
+    size = 900
+    ones = np.ones(size)
+    a = sp.diags([-ones[30:], -ones[1:], 4.1 * ones, -ones[1:], -ones[30:]], [-30, -1, 0, 1, 30])
+    solver = Factorization(symmetric)
+    solver.factorize(a.tocsr())
+    assert solver._solver.getPC().getFactorMatrix().getMumpsInfog(7) == 0
