@@ -11,6 +11,7 @@ from avneo_fem.meshing.refine import nested_meshes
 from avneo_fem.scene import parse_scene
 from avneo_fem.stages.cusp_setup import CuspSetup
 from avneo_fem.stages.shortfall import bulging, shortfalls
+from avneo_fem.stages.suturing import CuspSuturing
 
 Floats = NDArray[np.float64]
 
@@ -54,6 +55,29 @@ def test_large_triangles_are_moved_off_a_bend() -> None:
         found = bulging(setup, points)
         assert found[edge] == pytest.approx(np.full(2, cut * told), abs=1e-9)
         assert np.count_nonzero(found) == 2 * told
+
+
+@pytest.mark.parametrize(("half", "cut"), [(1.0, 0.4), (15.0, 4.0)])
+def test_moved_off_by_half_a_usual_edge_at_most(half: float, cut: float) -> None:
+    """Truth: ends of an edge that cuts c into a bend are asked for c more clearance, or for half
+    of the median edge, 1 mm here, if that is less: not for half of their own edge of 30 mm."""
+    setup = made()
+    mesh = setup.mesh
+    held = np.r_[mesh.suture_line, setup.row.nodes]
+    edge = next(e for e in mesh.edges if not np.isin(e, held).any())
+    radius = (half**2 + cut**2) / (2.0 * cut)
+    points = np.column_stack([mesh.points + 200.0, np.zeros(len(mesh.points))])
+    points[edge] = [[-half, 0.0, radius - cut], [half, 0.0, radius - cut]]
+    before = setup.wedge.clearance
+    clearance = before[edge].mean()
+    setup.wedge.field = OutsideBall(np.zeros(3), radius - clearance)  # type: ignore[assignment]
+    lengths = np.linalg.norm(np.diff(mesh.points[mesh.edges], axis=1), axis=2)
+    usual = float(np.median(lengths))
+    suturing = CuspSuturing(setup, lambda _index, _record: None)
+    assert suturing._keep_off(points)
+    asked = setup.wedge.clearance - before
+    assert asked[edge] == pytest.approx(min(cut, usual / 2), rel=0.05)
+    assert asked.max() == asked[edge].max()
 
 
 def test_little_clearance_weighs_more() -> None:
