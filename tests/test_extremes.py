@@ -53,6 +53,7 @@ def report(**changes: Any) -> dict[str, Any]:
         "copied_from": None,
         "failure": None,
         "residual": 1e-12,
+        "condition": 3e5,
         "clamp_error_deg": {"rms": 2.0},
         "stages": [{"name": "boundary", "iterations": 3}, {"name": "equilibrium", "iterations": 4}],
     }
@@ -218,6 +219,7 @@ def test_classify(
     if found is not None:
         # copied cusps cost no iterations
         assert (outcome.iterations, outcome.residual, outcome.clamp_degrees) == (7, 2e-12, 2.0)
+        assert outcome.condition == 3e5
         assert outcome.stage == "equilibrium"
 
 
@@ -244,7 +246,7 @@ def test_judged(case: ExtremeCase, kind: Kind, message: str, expected: Judgement
 
 
 ENDED = [
-    (FEASIBLE, Outcome("good", Kind.VERIFIED, "", 2.0, 40, 1e-12, 1.0, "equilibrium", 1e-10)),
+    (FEASIBLE, Outcome("good", Kind.VERIFIED, "", 2.0, 40, 1e-12, 1.0, "end", 1e-10, 2e7)),
     (replace(FEASIBLE, name="late"), Outcome("late", Kind.FAILED, "sags", 2.0, 40, 1.0, 1.0, "b")),
     (replace(FEASIBLE, name="slow"), Outcome("slow", Kind.TIMEOUT, "killed")),
     (HOPELESS, Outcome("hopeless", Kind.REFUSED, "too large")),
@@ -263,6 +265,7 @@ def test_table(tmp_path: Path) -> None:
     assert [row["judgement"] for row in rows] == [judged(*pair).value for pair in ENDED]
     assert rows[0]["residual"] == "1.0e-12"
     assert rows[2]["residual"] == ""
+    assert [row["condition"] for row in rows] == ["2.0e+07", "", "", ""]
 
 
 def test_map_is_drawn(tmp_path: Path) -> None:

@@ -49,6 +49,7 @@ CUSP: dict[str, Any] = {
     "outside_root_mm": float,
     "outside_wedge_mm": float,
     "edges_outside_wedge_mm": float,
+    "condition": float,
     "free_edge_sag_mm": float,
     "self_intersections": int,
     "copied_from": (int, type(None)),

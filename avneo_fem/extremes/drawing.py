@@ -39,6 +39,8 @@ def _figures(outcome: Any) -> str:
         lines.append(f"{outcome.iterations} it")
     if outcome.residual is not None:
         lines.append(f"res {outcome.residual:.0e}")
+    if outcome.condition is not None:
+        lines.append(f"cond {outcome.condition:.0e}")
     if outcome.deviation is not None:
         lines.append(f"off {outcome.deviation:.0e}")
     return "\n".join(lines)
@@ -55,7 +57,7 @@ def _rows(ended: Ended) -> list[tuple[str, list[Any]]]:
 
 
 def draw_map(path: Path, ended: Ended) -> None:
-    """Draw the outcomes, with iterations and residual, to a PNG file.
+    """Draw the outcomes, with iterations, residual and condition number, to a PNG file.
 
     Raises
     ------
@@ -69,9 +71,9 @@ def draw_map(path: Path, ended: Ended) -> None:
     except ImportError as error:
         raise PictureError(f"{path.name}: not drawn, Matplotlib is missing ({error})") from None
     rows = _rows(ended)
-    figure = Figure(figsize=(15.0, 1.05 * len(rows) + 1.3))
+    figure = Figure(figsize=(15.0, 1.15 * len(rows) + 1.3))
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.06, 0.0, 0.935, 1.0 - 1.1 / (1.05 * len(rows) + 1.3)))
+    axes = figure.add_axes((0.06, 0.0, 0.935, 1.0 - 1.1 / (1.15 * len(rows) + 1.3)))
     axes.set(xlim=(0, _PER_ROW), ylim=(-len(rows), 0.0))
     axes.set_axis_off()
     for number, (group, cells) in enumerate(rows):
@@ -90,7 +92,7 @@ def draw_map(path: Path, ended: Ended) -> None:
     handles = [Patch(color=_COLOURS[kind], label=text) for kind, text in _MEANING.items()]
     figure.legend(handles=handles, loc="upper center", ncols=4, frameon=False, fontsize=10)
     figure.text(
-        0.5, 1.0 - 0.62 / (1.05 * len(rows) + 1.3), summary(ended), ha="center", fontsize=12
+        0.5, 1.0 - 0.62 / (1.15 * len(rows) + 1.3), summary(ended), ha="center", fontsize=12
     )
     with written_whole(path) as temporary:
         figure.savefig(temporary, dpi=110)

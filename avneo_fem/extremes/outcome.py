@@ -57,6 +57,8 @@ class Outcome:
         Last stage of the first cusp that failed, or of the last cusp.
     deviation : float or None
         Largest distance from the valve that must come out, over its size.
+    condition : float or None
+        Largest condition number of the tangent where a cusp ended.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Outcome:
     clamp_degrees: float | None = None
     stage: str = ""
     deviation: float | None = None
+    condition: float | None = None
 
 
 def _told(errors: str) -> str:
@@ -100,6 +103,7 @@ def _measured(report: Mapping[str, Any]) -> dict[str, Any]:
         "iterations": sum(stage["iterations"] for cusp in solved for stage in cusp["stages"]),
         "residual": _largest([cusp["residual"] for cusp in cusps]),
         "clamp_degrees": _largest([cusp["clamp_error_deg"]["rms"] for cusp in cusps]),
+        "condition": _largest([cusp["condition"] for cusp in solved]),
         "stage": failed[0]["stages"][-1]["name"] if failed and failed[0]["stages"] else "",
     }
 

@@ -96,6 +96,7 @@ def build_report(
                 **asdict(measured),
                 "clamp_error_deg": {"largest": largest, "rms": rms},
                 "energy_mn_mm": result.energy,
+                "condition": result.condition,
                 "failure": result.failure,
                 "copied_from": result.copied_from,
             }

@@ -49,7 +49,8 @@ class CuspResult:
     says which stage failed and why, None when all ran. ``copied_from`` is the index of the
     congruent cusp this one was rotated from, ``shares`` the seconds spent in assembly,
     factorization, collision, penalties and all the rest ("python"), compilation apart,
-    ``energy`` the final one, penalties included and the pressure's work apart [mN mm].
+    ``energy`` the final one, penalties included and the pressure's work apart [mN mm], and
+    ``condition`` the condition number of the tangent there.
     """
 
     index: int
@@ -65,3 +66,4 @@ class CuspResult:
     copied_from: int | None = None
     shares: dict[str, float] = field(default_factory=dict)
     energy: float = float("nan")
+    condition: float = float("nan")

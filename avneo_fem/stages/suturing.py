@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from avneo_fem.equilibrium.condition import condition_number
 from avneo_fem.equilibrium.directors import start_directors
 from avneo_fem.meshing.cusp_mesh import CuspMesh
 from avneo_fem.meshing.harmonic import harmonic_extension
@@ -116,6 +117,7 @@ class CuspSuturing(PenaltyRaising):
             seconds=seconds,
             shares=shares,
             energy=setup.system.energy(state),
+            condition=condition_number(setup.system, state),
         )
 
     def _run_from(self, state: Floats, done: int) -> tuple[Floats, str | None]:
