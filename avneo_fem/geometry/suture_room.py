@@ -12,6 +12,8 @@ from avneo_fem.scene_schema import Scene
 __all__ = ["narrow_room_warning", "require_suture_room"]
 
 _SAMPLES = 400
+#: by which share it must be wider on both sides of a narrow place
+_WIDER = 0.2
 
 
 def narrow_room_warning(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> str | None:
@@ -27,7 +29,8 @@ def narrow_room_warning(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> 
         points = line.point(np.linspace(0.0, line.length, _SAMPLES + 1))
         room = wedges.wedge(cusp.index, 1.0).signed_distance(points)
         wider = np.minimum(np.maximum.accumulate(room), np.maximum.accumulate(room[::-1])[::-1])
-        narrow = np.flatnonzero((room < cusp.thickness) & (wider > cusp.thickness))
+        margin = _WIDER * np.maximum(room, 0.1 * cusp.thickness)
+        narrow = np.flatnonzero((room < cusp.thickness) & (wider > room + margin))
         if narrow.size:
             least = narrow[np.argmin(room[narrow])]
             degrees = np.degrees(np.arctan2(points[least, 1], points[least, 0])) % 360.0
