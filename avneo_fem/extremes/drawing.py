@@ -71,9 +71,10 @@ def draw_map(path: Path, ended: Ended) -> None:
     except ImportError as error:
         raise PictureError(f"{path.name}: not drawn, Matplotlib is missing ({error})") from None
     rows = _rows(ended)
-    figure = Figure(figsize=(15.0, 1.15 * len(rows) + 1.3))
+    height = 1.15 * len(rows) + 1.3
+    figure = Figure(figsize=(15.0, height))
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.06, 0.0, 0.935, 1.0 - 1.1 / (1.15 * len(rows) + 1.3)))
+    axes = figure.add_axes((0.06, 0.0, 0.935, 1.0 - 1.1 / height))
     axes.set(xlim=(0, _PER_ROW), ylim=(-len(rows), 0.0))
     axes.set_axis_off()
     for number, (group, cells) in enumerate(rows):
@@ -91,8 +92,6 @@ def draw_map(path: Path, ended: Ended) -> None:
             axes.text(middle, -number - 0.93, text, ha="center", va="bottom", fontsize=7.5)
     handles = [Patch(color=_COLOURS[kind], label=text) for kind, text in _MEANING.items()]
     figure.legend(handles=handles, loc="upper center", ncols=4, frameon=False, fontsize=10)
-    figure.text(
-        0.5, 1.0 - 0.62 / (1.15 * len(rows) + 1.3), summary(ended), ha="center", fontsize=12
-    )
+    figure.text(0.5, 1.0 - 0.62 / height, summary(ended), ha="center", fontsize=12)
     with written_whole(path) as temporary:
         figure.savefig(temporary, dpi=110)

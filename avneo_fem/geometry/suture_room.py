@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from avneo_fem.errors import SceneError
 from avneo_fem.geometry.contact_wedge import ContactWedgeFamily
+from avneo_fem.geometry.cusp_geometry import CuspGeometry
 from avneo_fem.geometry.valve_geometry import ValveGeometry
 from avneo_fem.scene_schema import Scene
 
 __all__ = ["narrow_room_warning", "require_suture_room"]
 
+Array = NDArray[np.float64]
+
 _SAMPLES = 400
 #: by which share it must be wider on both sides of a narrow place
 _WIDER = 0.2
+
+
+def _along_the_line(cusp: CuspGeometry, wedges: ContactWedgeFamily) -> tuple[Array, Array]:
+    """Points (n, 3) of a suture line, and how far each is from the cusp's wedge (n,) [mm]."""
+    line = cusp.suture_line
+    points = line.point(np.linspace(0.0, line.length, _SAMPLES + 1))
+    return points, wedges.wedge(cusp.index, 1.0).signed_distance(points)
 
 
 def narrow_room_warning(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> str | None:
@@ -25,9 +36,7 @@ def narrow_room_warning(geometry: ValveGeometry, wedges: ContactWedgeFamily) -> 
     """
     found = []
     for cusp in geometry.cusps:
-        line = cusp.suture_line
-        points = line.point(np.linspace(0.0, line.length, _SAMPLES + 1))
-        room = wedges.wedge(cusp.index, 1.0).signed_distance(points)
+        points, room = _along_the_line(cusp, wedges)
         wider = np.minimum(np.maximum.accumulate(room), np.maximum.accumulate(room[::-1])[::-1])
         margin = _WIDER * np.maximum(room, 0.1 * cusp.thickness)
         narrow = np.flatnonzero((room < cusp.thickness) & (wider > room + margin))
@@ -61,9 +70,7 @@ def require_suture_room(scene: Scene, geometry: ValveGeometry, wedges: ContactWe
         Names the free edges, the cusp, and how far and how much of its line lies beyond.
     """
     for cusp in geometry.cusps:
-        line = cusp.suture_line
-        points = line.point(np.linspace(0.0, line.length, _SAMPLES + 1))
-        distance = wedges.wedge(cusp.index, 1.0).signed_distance(points)
+        _, distance = _along_the_line(cusp, wedges)
         if distance.min() < -scene.inside_tolerance(cusp.thickness):
             share = 100.0 * float((distance < 0.0).mean())
             raise SceneError(
